@@ -1,0 +1,76 @@
+"""Checks of array arguments: one place for the shape rule of the suite.
+
+Every public function takes arrays with any leading batch axes; only the trailing axes are fixed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from leg_kinematics.errors import ShapeError, ValueRangeError
+
+FloatArray = NDArray[np.floating[Any]]
+StatusArray = NDArray[np.uint8]
+
+
+def as_array(name: str, value: ArrayLike, *trailing: int) -> FloatArray:
+    """Return `value` as a float64 array whose trailing axes have the given lengths.
+
+    Args:
+        name: Name of the argument for the error message.
+        value: Array-like of shape (..., *trailing).
+        *trailing: Required lengths of the last axes; none for any shape.
+
+    Raises:
+        ShapeError: If it is not numeric or its trailing axes differ.
+    """
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} must be an array of numbers: {error}") from None
+    if np.ndim(value) == 0 and not trailing:
+        array = array.reshape(())  # ascontiguousarray turns a scalar into a vector
+    if array.shape[array.ndim - len(trailing) :] != trailing:
+        wanted = ", ".join(["...", *map(str, trailing)])
+        raise ShapeError(f"{name} must have shape ({wanted}), got {np.shape(value)}")
+    return array
+
+
+def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: Any) -> FloatArray:
+    """Return `value` as an array of shape (..., *trailing) that broadcasts with `batch`.
+
+    Args:
+        name: Name of the argument for the error message.
+        value: Array-like of shape (..., *trailing).
+        trailing: Required lengths of the last axes.
+        batch: Leading shape that it has to broadcast with.
+
+    Raises:
+        ShapeError: If the trailing axes differ or the leading ones do not broadcast.
+    """
+    array = as_array(name, value, *trailing)
+    leading = array.shape[: array.ndim - len(trailing)]
+    try:
+        np.broadcast_shapes(leading, batch)
+    except ValueError:
+        raise ShapeError(
+            f"{name} has leading shape {leading}, which does not broadcast with {tuple(batch)}"
+        ) from None
+    return array
+
+
+def as_non_negative(name: str, value: ArrayLike) -> FloatArray:
+    """Return `value` as an array whose elements are all ≥ 0 (infinity is allowed).
+
+    Raises:
+        ShapeError: If it is not numeric.
+        ValueRangeError: If an element is negative or NaN.
+    """
+    array = as_array(name, value)
+    bad = ~(array >= 0.0)
+    if np.any(bad):
+        raise ValueRangeError(f"{name} must be >= 0, got {array[bad].flat[0]}")
+    return array

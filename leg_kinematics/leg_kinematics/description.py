@@ -1,0 +1,249 @@
+"""Robot descriptions: YAML in the units of its author to a `Robot` in SI, with every mistake named.
+
+A file has this form (lengths and angles in the units it states, efforts in N.m or N):
+
+    name: hexapod
+    base_frame: base_link
+    units: {length: mm, angle: deg}
+    leg_types:
+      initial:
+        mechanism: parallel_drive
+        geometry: {crank_spacing: 276, ...}             # every parameter of the mechanism
+        joint_limits: {crank_1: [-21, 21], ...}
+        passive_joint_limits: {u1_along: [-45, 45], ...}
+        effort_limits: {crank_1: 150, crank_2: [-150, 120], ...}
+    legs:
+      left_front:
+        type: initial
+        mount: {position: [500, 250, 0], rpy: [0, 0, -90]}
+        mirrored: true                                  # optional, default false
+        frame: left_front_leg                           # optional, default <leg>_leg
+        joint_names: {crank_1: lf_motor_1, ...}         # optional, default <leg>_<joint>
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.documents import (
+    NAME,
+    NUMBER,
+    PAIR,
+    VECTOR,
+    Document,
+    mapping_schema,
+    named_schema,
+    shared_files,
+)
+from leg_kinematics.errors import DescriptionError, GeometryError
+from leg_kinematics.mechanism import Joint, geometry_parameters
+from leg_kinematics.mechanisms import MECHANISMS
+from leg_kinematics.mirrored import Mirrored
+from leg_kinematics.robot import Leg, Mount, Robot
+
+UNITS = {
+    "length": {"m": 1.0, "cm": 0.01, "mm": 0.001},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "ratio": {"1": 1.0},
+}
+
+EFFORT = {
+    "description": "a number >= 0 (symmetric) or a pair [lower, upper]",
+    "oneOf": [{"type": "number", "minimum": 0}, PAIR],
+}
+
+ROBOT_SCHEMA = mapping_schema(
+    {
+        "name": NAME,
+        "base_frame": NAME,
+        "units": mapping_schema(
+            {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
+        ),
+        "leg_types": named_schema(
+            {
+                "type": "object",
+                "properties": {"mechanism": {"enum": list(MECHANISMS)}},
+                "required": ["mechanism"],
+            }
+        ),
+        "legs": named_schema(
+            mapping_schema(
+                {
+                    "type": NAME,
+                    "mount": mapping_schema(
+                        {"position": VECTOR, "rpy": VECTOR}, ["position", "rpy"]
+                    ),
+                    "mirrored": {"type": "boolean"},
+                    "frame": NAME,
+                    "joint_names": {"type": "object"},
+                },
+                ["type", "mount"],
+            )
+        ),
+    },
+    ["name", "base_frame", "units", "leg_types", "legs"],
+)
+
+
+def _leg_type_schema(mechanism: Any) -> dict[str, Any]:
+    """Return the schema of a leg type, made from the mechanism's own fields and joints."""
+    geometry = {
+        f.name: {**NUMBER, "exclusiveMinimum": 0} if f.metadata["positive"] else NUMBER
+        for f in geometry_parameters(mechanism)
+    }
+    joints = [j.name for j in mechanism.joints]
+    passive = [j.name for j in mechanism.passive_joints]
+    return mapping_schema(
+        {
+            "mechanism": {"const": mechanism.name},
+            "geometry": mapping_schema(geometry, list(geometry)),
+            "joint_limits": mapping_schema(dict.fromkeys(joints, PAIR), joints),
+            "passive_joint_limits": mapping_schema(dict.fromkeys(passive, PAIR), passive),
+            "effort_limits": mapping_schema(dict.fromkeys(joints, EFFORT), joints),
+        },
+        ["mechanism", "geometry", "joint_limits", "passive_joint_limits", "effort_limits"],
+    )
+
+
+def load_robot(source: str | os.PathLike[str]) -> Robot:
+    """Load a robot description.
+
+    Args:
+        source: Path of a YAML file, or the name of a robot that ships with `leg_bringup`.
+
+    Raises:
+        DescriptionError: If the file is missing or wrong; the message names, for every mistake,
+            file, line, path of the key, the value and what is allowed.
+    """
+    return robot_from_document(Document(find_robot_file(source)))
+
+
+def find_robot_file(source: str | os.PathLike[str]) -> Path:
+    """Return the path of a description given by path or by the name of a shipped robot.
+
+    Raises:
+        DescriptionError: If there is no such file; the message lists the shipped robots.
+    """
+    path = Path(source).expanduser()
+    if path.suffix in (".yaml", ".yml") or path.is_file():
+        if not path.is_file():
+            raise DescriptionError(f"robot description {path} does not exist")
+        return path
+    shipped = shared_files("leg_bringup", "robots", ".yaml")
+    if str(source) not in shipped:
+        raise DescriptionError(
+            f"no robot named {str(source)!r}; shipped robots: {', '.join(sorted(shipped))}; "
+            "or give the path of a YAML file"
+        )
+    return shipped[str(source)]
+
+
+def robot_from_document(document: Document) -> Robot:
+    """Build a robot from a parsed description.
+
+    Raises:
+        DescriptionError: If anything in it is wrong.
+    """
+    document.check(ROBOT_SCHEMA)
+    root = document.root
+    for name, leg_type in root["leg_types"].items():
+        document.check(_leg_type_schema(MECHANISMS[leg_type["mechanism"]]), "leg_types", name)
+    units = {k: UNITS[k][v] for k, v in root["units"].items()} | {"ratio": 1.0}
+    mechanisms = {name: _mechanism(document, name, units) for name in root["leg_types"]}
+    legs = {name: _leg(document, name, mechanisms, units) for name in root["legs"]}
+    _check_unique_joints(document, legs)
+    return Robot(root["name"], root["base_frame"], legs)
+
+
+def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any:
+    leg_type = document.node("leg_types", name)
+    mechanism = MECHANISMS[leg_type["mechanism"]]
+    geometry = {
+        f.name: float(leg_type["geometry"][f.name]) * units[f.metadata["dimension"]]
+        for f in geometry_parameters(mechanism)
+    }
+
+    def ranges(key: str, joints: Sequence[Joint]) -> tuple[tuple[float, float], ...]:
+        pairs = []
+        for joint in joints:
+            scale = units["angle" if joint.type == "revolute" else "length"]
+            lower, upper = leg_type[key][joint.name]
+            if lower > upper:
+                message = f"{[lower, upper]}: lower must be <= upper"
+                raise document.error(message, "leg_types", name, key, joint.name)
+            pairs.append((lower * scale, upper * scale))
+        return tuple(pairs)
+
+    try:
+        return mechanism(
+            **geometry,
+            joint_ranges=ranges("joint_limits", mechanism.joints),
+            passive_joint_ranges=ranges("passive_joint_limits", mechanism.passive_joints),
+        )
+    except GeometryError as error:
+        message = f"cannot be assembled: {error}"
+        raise document.error(message, "leg_types", name, "geometry") from None
+
+
+def _effort_limits(document: Document, leg_type: str, joints: Sequence[Joint]) -> FloatArray:
+    limits = []
+    for joint in joints:
+        where = ("leg_types", leg_type, "effort_limits", joint.name)
+        value = document.node(*where)
+        lower, upper = value if isinstance(value, Sequence) else (-value, value)
+        if not lower <= 0.0 <= upper:
+            message = f"{[lower, upper]}: must be lower <= 0 <= upper [{joint.effort_unit}]"
+            raise document.error(message, *where)
+        limits.append((lower, upper))
+    return np.array(limits, dtype=np.float64)
+
+
+def _leg(
+    document: Document, name: str, mechanisms: Mapping[str, Any], units: Mapping[str, float]
+) -> Leg:
+    entry = document.node("legs", name)
+    leg_type = entry["type"]
+    if leg_type not in mechanisms:
+        message = f"unknown leg type {leg_type!r}; allowed: {', '.join(mechanisms)}"
+        raise document.error(message, "legs", name, "type")
+    original = mechanisms[leg_type]
+    joints = [joint.name for joint in original.joints]
+    if entry.get("mirrored", False) and original.task_coordinates != ("x", "y", "z"):
+        message = f"mechanism {original.name!r} has no point foot and cannot be mirrored"
+        raise document.error(message, "legs", name, "mirrored")
+    joint_names = entry.get("joint_names", {})
+    if joint_names:
+        schema = mapping_schema(dict.fromkeys(joints, NAME), ())
+        document.check(schema, "legs", name, "joint_names")
+    mechanism: Any = Mirrored(original) if entry.get("mirrored", False) else original
+    mount = entry["mount"]
+    rotation = Rotation.from_euler("xyz", np.array(mount["rpy"], float) * units["angle"])
+    return Leg(
+        name=name,
+        leg_type=leg_type,
+        mechanism=mechanism,
+        mount=Mount(
+            np.array(mount["position"], dtype=np.float64) * units["length"], rotation.as_matrix()
+        ),
+        frame=entry.get("frame", f"{name}_leg"),
+        joint_names=tuple(joint_names.get(joint, f"{name}_{joint}") for joint in joints),
+        effort_limits=_effort_limits(document, leg_type, original.joints),
+    )
+
+
+def _check_unique_joints(document: Document, legs: Mapping[str, Leg]) -> None:
+    owner: dict[str, str] = {}
+    for leg in legs.values():
+        for joint in leg.joint_names:
+            if joint in owner:
+                message = f"joint name {joint!r} is already used by leg {owner[joint]!r}"
+                raise document.error(message, "legs", leg.name)
+            owner[joint] = leg.name

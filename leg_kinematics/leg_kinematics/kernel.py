@@ -1,0 +1,125 @@
+"""Scalar code of one point, compiled and broadcast over all leading axes of a batch.
+
+The mathematics of a point is written once, as scalar Python that reads like the paper:
+
+    @scalar
+    def hypotenuse(a, b):
+        return math.sqrt(a * a + b * b)
+
+    @kernel("(),()->()", "f8, f8, f8[:]")
+    def hypotenuse_kernel(a, b, result):
+        result[0] = hypotenuse(a, b)
+
+    hypotenuse_kernel(np.ones(1000), 2.0)   # a numpy generalized ufunc
+
+Scalar code calls other scalar code by its global name; numba cannot cache functions that come as
+arguments or in closures. Compiled code is cached between processes. The cache folder of a kernel is
+named after a digest of the sources of everything the kernel calls, because numba itself notices
+only edits of the file in which the kernel stands.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+import os
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+# numpy's error model: a division by zero yields inf or NaN for that point, never an exception.
+scalar = numba.njit(error_model="numpy")
+
+_compile_lock = threading.RLock()
+
+
+class Kernel:
+    """A generalized ufunc that compiles, or loads its cached machine code, at its first call."""
+
+    def __init__(self, function: Callable[..., None], layout: str, types: str) -> None:
+        self.function = function
+        self.layout = layout
+        self.types = types
+        self.__doc__ = function.__doc__
+
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        """Apply the kernel to every point of the broadcast arguments."""
+        with np.errstate(all="ignore"):  # NaN marks points without an answer; no warning needed
+            return self.gufunc(*arguments, **keywords)
+
+    @cached_property
+    def gufunc(self) -> Any:
+        """The compiled generalized ufunc."""
+        with _compile_lock:
+            folder = _cache_folder(self.function)
+            name = f"{self.function.__module__}.{self.function.__qualname__}"
+            if folder is None or not any(folder.rglob(f"*.{self.function.__name__}-*.nbi")):
+                print(f"compiling {name} for this machine (once)", file=sys.stderr, flush=True)
+            decorate = numba.guvectorize(
+                [f"({self.types})"], self.layout, nopython=True, cache=folder is not None
+            )
+            previous = numba.config.CACHE_DIR
+            numba.config.CACHE_DIR = str(folder or previous)
+            try:
+                return decorate(self.function)
+            finally:
+                numba.config.CACHE_DIR = previous
+
+
+def kernel(layout: str, types: str) -> Callable[[Callable[..., None]], Kernel]:
+    """Make a function of one point a generalized ufunc.
+
+    Args:
+        layout: Layout of inputs and outputs, e.g. "(n),()->(n)".
+        types: numba types of the arguments in the same order, e.g. "f8[:], f8, f8[:]".
+    """
+    return lambda function: Kernel(function, layout, types)
+
+
+def _cache_folder(function: Callable[..., None]) -> Path | None:
+    """Return a writable folder for the compiled code of `function`, or None without one."""
+    roots = [os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME"), "~/.cache"]
+    for root in filter(None, roots):
+        folder = Path(root).expanduser() / "leg_kernels" / _digest(function)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    warnings.warn("no writable cache folder: kernels compile anew in every process", stacklevel=2)
+    return None
+
+
+def _digest(function: Callable[..., None]) -> str:
+    """Return a digest of the sources of `function` and of all scalar code it calls."""
+    parts = [numba.__version__, *sorted(set(_sources(function, set())))]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
+    """Yield the source of `function`, of its callees and the constants they use."""
+    if function in seen:
+        return
+    seen.add(function)
+    yield inspect.getsource(function)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, Dispatcher):
+            yield from _sources(value.py_func, seen)
+        elif isinstance(value, (int, float)) and not (
+            isinstance(value, float) and math.isnan(value)
+        ):
+            yield f"{name}={value!r}"
+        elif isinstance(value, type):
+            yield f"{name}={getattr(value, '_fields', value)!r}"

@@ -1,0 +1,32 @@
+"""The leg mechanisms, one file each, and the registry by which descriptions name them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from leg_kinematics.errors import UnknownNameError
+from leg_kinematics.mechanisms.double_rhombus import DoubleRhombus
+from leg_kinematics.mechanisms.gantry_hybrid import GantryHybrid
+from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
+from leg_kinematics.mechanisms.six_bar import SixBar
+from leg_kinematics.mechanisms.theo_jansen import TheoJansen
+
+MECHANISMS: dict[str, type[Any]] = {
+    ParallelDrive.name: ParallelDrive,
+    SixBar.name: SixBar,
+    TheoJansen.name: TheoJansen,
+    DoubleRhombus.name: DoubleRhombus,
+    GantryHybrid.name: GantryHybrid,
+}
+
+
+def mechanism_class(name: str) -> type[Any]:
+    """Return the mechanism class registered under `name`.
+
+    Raises:
+        UnknownNameError: If there is none.
+    """
+    try:
+        return MECHANISMS[name]
+    except KeyError:
+        raise UnknownNameError("mechanism", name, MECHANISMS) from None

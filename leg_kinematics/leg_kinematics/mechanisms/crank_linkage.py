@@ -1,0 +1,564 @@
+"""What planar legs driven by one crank have in common, whatever bars follow the crank.
+
+The linkage is computed in its own plane and in crank lengths: crank axis A at the origin, X and Y
+as papers draw them (Y up, the foot below), the crank turning counter-clockwise. The leg frame has
+its origin at A too, with y = -X and z = Y, because a foot on the ground then moves towards -y when
+the crank turns forwards: the leg walks along +y. The crank's axis is -x of the leg frame.
+
+A mechanism adds its geometry and a handful of kernels, which all get its geometry and its `sides`:
+numbers whose signs tell the assembly (see `dyads`). A posture's closure is such numbers, the
+`across` coefficient of each dyad.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import product
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.dyads import Point
+from leg_kinematics.errors import GeometryError
+from leg_kinematics.kernel import Kernel, kernel, scalar
+from leg_kinematics.mechanism import (
+    Joint,
+    Linkage,
+    Posture,
+    check_geometry,
+    check_limits,
+    geometry_values,
+    mode_index,
+)
+from leg_kinematics.scalars import LIMIT_TOLERANCE, within
+from leg_kinematics.status import Status
+
+OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
+
+TURN = 2.0 * math.pi
+ANY_ANGLE = (-math.pi, math.pi)  # a range of a whole turn or more is no limit
+DEAD_POINT = 1e-6  # |sin| of the angle between a dyad's bars, below which the foot is not governed
+CURVE_SAMPLES = 720  # of the foot curve, between which passes of the foot are refined
+MAX_PASSES = 8  # of the foot at a point
+REFINEMENTS = 60
+REFINED = 1e-14  # [rad]
+
+
+class Dyad(NamedTuple):
+    """Two bars that meet in a joint: names of points and of the geometry's fields."""
+
+    joint: str
+    ends: tuple[str, str]
+    bars: tuple[str, str]
+
+
+class Triangle(NamedTuple):
+    """A rigid triangle p, q, tip: its points and the fields of the sides p-q, p-tip, q-tip."""
+
+    points: tuple[str, str, str]
+    sides: tuple[str, str, str]
+
+
+class Pivot(NamedTuple):
+    """A passive joint at a point: the angle from one bar to another, by their far ends."""
+
+    name: str
+    point: str
+    first: str
+    second: str
+
+
+class Kernels(NamedTuple):
+    """The compiled mathematics of one linkage; see any of the mechanisms for the signatures."""
+
+    constants: Kernel
+    forward: Kernel
+    motion: Kernel
+    points: Kernel
+    foot_in_plane: Kernel
+    nearest: Kernel
+    crossing: Kernel
+
+
+class Passes(NamedTuple):
+    """Crank angles at which the foot passes a point, nearest first; NaN beyond the last.
+
+    Attributes:
+        crank_angles: (..., 8) [rad].
+        distances: Distance of the foot from the point (..., 8) [m].
+    """
+
+    crank_angles: FloatArray
+    distances: FloatArray
+
+
+# --------------------------------------------------------------------------- scalar mathematics
+
+
+@scalar
+def side(number: float) -> float:
+    """Return the sign of a number as +1 or -1; NaN for NaN."""
+    return math.nan if math.isnan(number) else math.copysign(1.0, number)
+
+
+@scalar
+def status_of_crank(q: float, limits: FloatArray, foot: Point, transmission: float) -> int:
+    """Return the status of one crank angle, given the worst transmission of its dyads."""
+    if not math.isfinite(q):
+        return INVALID_INPUT
+    if not math.isfinite(foot.x + foot.y + transmission):
+        return UNREACHABLE
+    if transmission < DEAD_POINT:
+        return SINGULAR
+    unlimited = limits[1] - limits[0] >= TURN - LIMIT_TOLERANCE
+    return OK if unlimited or within(q, limits) else JOINT_LIMIT
+
+
+class Bracket(NamedTuple):
+    """A root between two crank angles, the best guess of it, and the state of its search."""
+
+    lower: float
+    upper: float
+    angle: float
+    steps: int
+    done: bool
+
+
+@scalar
+def bracket_between(lower: float, upper: float) -> Bracket:
+    """Return a bracket; a search in a NaN bracket is over."""
+    return Bracket(lower, upper, 0.5 * (lower + upper), 0, not lower <= upper)
+
+
+@scalar
+def narrowed(bracket: Bracket, value: float, slope: float) -> Bracket:
+    """Return the bracket after a step towards the root of a rising function.
+
+    A step of Newton's method if it stays inside, else a bisection. NaN, where the linkage does not
+    close, lies beyond the root.
+    """
+    lower, upper, angle, steps, _ = bracket
+    if value > 0.0 or (math.isnan(value) and angle > 0.5 * (lower + upper)):
+        upper = angle
+    else:
+        lower = angle
+    following = angle - value / slope
+    if not (slope > 0.0 and lower <= following <= upper):
+        following = 0.5 * (lower + upper)
+    done = abs(following - angle) < REFINED or steps >= REFINEMENTS
+    return Bracket(lower, upper, following, steps + 1, done)
+
+
+@scalar
+def approach(foot: Point, x: float, y: float) -> tuple[float, float]:
+    """Return first and second derivative of half the foot's squared distance from (x, y)."""
+    dx, dy = foot.x - x, foot.y - y
+    slope = dx * foot.vx + dy * foot.vy
+    return slope, foot.vx * foot.vx + foot.vy * foot.vy + dx * foot.ax + dy * foot.ay
+
+
+@scalar
+def squared_distance(curve: FloatArray, i: int, x: float, y: float) -> float:
+    """Return the squared distance of sample i from (x, y); infinite for a separator."""
+    squared = (curve[i, 1] - x) ** 2 + (curve[i, 2] - y) ** 2
+    return math.inf if math.isnan(squared) else squared
+
+
+@kernel("(m,t),(),(),(k)->(k),(k)", "f8[:,:], f8, f8, f8[:], f8[:], f8[:]")
+def _near_brackets(curve, x, y, shape, lower, upper):  # type: ignore[no-untyped-def]
+    """Brackets about the samples nearer to (X, Y) than both neighbours, nearest first, then NaN.
+
+    The first and the last sample only serve as neighbours.
+    """
+    lower[:] = math.nan
+    upper[:] = math.nan
+    if not math.isfinite(x + y):
+        return
+    samples = curve.shape[0]
+    nearest = np.zeros(lower.shape[0], dtype=np.int64)
+    squares = np.full(lower.shape[0], math.inf)
+    before, here = squared_distance(curve, 0, x, y), squared_distance(curve, 1, x, y)
+    for i in range(1, samples - 1):
+        after = squared_distance(curve, i + 1, x, y)
+        if here <= before and here <= after and here < squares[-1]:
+            k = squares.shape[0] - 1
+            while k > 0 and squares[k - 1] > here:
+                nearest[k], squares[k] = nearest[k - 1], squares[k - 1]
+                k -= 1
+            nearest[k], squares[k] = i, here
+        before, here = here, after
+    for k in range(squares.shape[0]):
+        if squares[k] < math.inf:
+            i = nearest[k]
+            lower[k] = curve[i - 1, 0] if math.isfinite(curve[i - 1, 0]) else curve[i, 0]
+            upper[k] = curve[i + 1, 0] if math.isfinite(curve[i + 1, 0]) else curve[i, 0]
+
+
+# --------------------------------------------------------------------------- mechanism
+
+
+def flipped_modes(default: str, parts: Sequence[str]) -> tuple[str, ...]:
+    """Return the default mode and one for each set of parts assembled the other way round."""
+    flips = [
+        "+".join(part for part, flip in zip(parts, bits, strict=True) if flip)
+        for bits in product((False, True), repeat=len(parts))
+    ]
+    return (default, *(f"flipped_{name}" for name in flips[1:]))
+
+
+def mode_sides(walking: Sequence[float]) -> FloatArray:
+    """Return the sides of every mode of `flipped_modes` (modes, parts)."""
+    flips = product((1.0, -1.0), repeat=len(walking))
+    return np.array(list(flips), dtype=np.float64) * np.asarray(walking)
+
+
+class CrankLinkage:
+    """Base of the mechanisms with one crank; a subclass is a frozen dataclass of its geometry.
+
+    A range of a joint that spans a whole turn or more does not limit it: the joint turns endlessly,
+    and inverse answers are given within one turn about the middle of the range.
+    """
+
+    name: ClassVar[str]
+    joints: ClassVar[tuple[Joint, ...]] = (Joint("crank"),)
+    passive_joints: ClassVar[tuple[Joint, ...]]
+    closure_names: ClassVar[tuple[str, ...]]
+    assembly_modes: ClassVar[tuple[str, ...]]
+    task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
+
+    sides: ClassVar[FloatArray]  # of every assembly mode
+    kernels: ClassVar[Kernels]
+    constants_size: ClassVar[int]
+    point_names: ClassVar[tuple[str, ...]]
+    dyads: ClassVar[tuple[Dyad, ...]]
+    triangles: ClassVar[tuple[Triangle, ...]]
+    pivots: ClassVar[tuple[Pivot, ...]]
+    bars: ClassVar[tuple[tuple[str, ...], ...]]
+
+    crank: ClassVar[float] = 1.0  # A B, the unit of all ratios
+
+    crank_length: float
+    crank_zero: float
+    reach_tolerance: float
+    joint_ranges: tuple[tuple[float, float], ...]
+    passive_joint_ranges: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        """Check the dimensions by assembling the posture with the crank at zero."""
+        check_geometry(self)
+        check_limits("joint_ranges", self.joint_ranges, self.joints)
+        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        for triangle in self.triangles:
+            a, b, c = sorted(getattr(self, field) for field in triangle.sides)
+            if a + b < c * (1.0 - 1e-9):
+                sides = ", ".join(f"{field} = {getattr(self, field)}" for field in triangle.sides)
+                raise GeometryError(
+                    f"the rigid triangle {'-'.join(triangle.points)} does not close: {sides}; "
+                    "each must be <= the sum of the other two"
+                )
+        self._check_initial_posture()
+
+    def _check_initial_posture(self) -> None:
+        _, _, status = self._solve(np.zeros(1), self.sides[0])
+        if status == SINGULAR:
+            raise GeometryError("the posture with the crank at zero is singular")
+        if status != UNREACHABLE:
+            return
+        points = dict(zip(self.point_names, self._points(np.zeros(1), self.sides[0]), strict=True))
+        for dyad in self.dyads:
+            if np.isnan(points[dyad.joint]).any():
+                first, second = dyad.bars
+                distance = np.linalg.norm(points[dyad.ends[0]] - points[dyad.ends[1]])
+                raise GeometryError(
+                    f"with the crank at zero the bars {first} = {getattr(self, first)} and "
+                    f"{second} = {getattr(self, second)} do not meet in {dyad.joint}: their ends "
+                    f"{' and '.join(dyad.ends)} are {distance / self.crank_length:.6g} crank "
+                    "lengths apart"
+                )
+        raise GeometryError("the lengths are too large or too small to compute with")
+
+    @cached_property
+    def joint_limits(self) -> FloatArray:
+        """Range of the crank about its zero (1, 2) [rad]; a whole turn is no limit."""
+        return np.array(self.joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def passive_joint_limits(self) -> FloatArray:
+        """Ranges of the passive joints as excursions from the initial posture (p, 2) [rad]."""
+        return np.array(self.passive_joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def initial_posture(self) -> Posture:
+        """The posture with the crank at zero."""
+        return self.forward(np.zeros(1))
+
+    @cached_property
+    def _constants(self) -> FloatArray:
+        constants: FloatArray = self.kernels.constants(
+            geometry_values(self), np.zeros(self.constants_size)
+        )
+        return constants
+
+    def _sides(self, assembly_mode: str) -> FloatArray:
+        sides: FloatArray = self.sides[mode_index(self, assembly_mode)]  # type: ignore[arg-type]
+        return sides
+
+    def _solve(self, q: FloatArray, sides: FloatArray) -> Any:
+        return self.kernels.forward(self._constants, sides, self.joint_limits[0], q, np.zeros(3))
+
+    def _points(self, q: FloatArray, sides: FloatArray) -> Any:
+        shape = np.zeros((len(self.point_names), 3))
+        return self.kernels.points(self._constants, sides, q, shape)
+
+    def forward(self, joint_positions: ArrayLike, assembly_mode: str = "") -> Posture:
+        """Solve for the foot, in closed form.
+
+        Args:
+            joint_positions: Crank angle about its zero (..., 1) [rad].
+            assembly_mode: One of `assembly_modes`; "" is "walking".
+
+        Returns:
+            The posture; NaN where the bars do not close.
+        """
+        q = as_array("joint_positions", joint_positions, 1)
+        foot, closure, status = self._solve(q, self._sides(assembly_mode))
+        posture = Posture(q, closure, foot, status)
+        limited = np.ptp(self.passive_joint_limits, axis=-1) < TURN - LIMIT_TOLERANCE
+        if limited.any():
+            excursions = self.passive_joint_positions(posture)[..., limited]
+            lower, upper = self.passive_joint_limits[limited].T
+            outside = (excursions < lower - LIMIT_TOLERANCE) | (
+                excursions > upper + LIMIT_TOLERANCE
+            )
+            exceeded = (status == OK) & outside.any(axis=-1)
+            posture = posture._replace(
+                status=np.where(exceeded, np.uint8(PASSIVE_JOINT_LIMIT), status)
+            )
+        return posture
+
+    def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
+        """Solve for the crank angle at which the foot passes nearest to a position.
+
+        Args:
+            foot_position: Wanted foot in the leg frame (..., 3) [m].
+            assembly_mode: One of `assembly_modes`; "" is "walking".
+
+        Returns:
+            The posture with the foot where the crank brings it; NaN and UNREACHABLE where that is
+            farther than `reach_tolerance` from the wanted position.
+        """
+        foot = as_array("foot_position", foot_position, 3)
+        passes = self.nearest_crank_angles(foot, assembly_mode)
+        reached = passes.distances[..., 0] <= self.reach_tolerance
+        q = np.where(reached, passes.crank_angles[..., 0], np.nan)[..., None]
+        posture = self.forward(q, assembly_mode)
+        missed = np.where(np.isfinite(foot).all(axis=-1), UNREACHABLE, INVALID_INPUT)
+        status = np.where(reached, posture.status, missed).astype(np.uint8)
+        return posture._replace(status=status)
+
+    def nearest_crank_angles(self, foot_position: ArrayLike, assembly_mode: str = "") -> Passes:
+        """Return all passes of the foot near a position: local minima of the distance.
+
+        Args:
+            foot_position: Position in the leg frame (..., 3) [m].
+            assembly_mode: One of `assembly_modes`; "" is "walking".
+        """
+        foot = as_array("foot_position", foot_position, 3)
+        mode = mode_index(self, assembly_mode)  # type: ignore[arg-type]
+        with np.errstate(over="ignore"):  # infinitely far is far enough
+            x, y = -foot[..., 1] / self.crank_length, foot[..., 2] / self.crank_length
+        lower, upper = _near_brackets(self._curves[mode], x, y, np.zeros(MAX_PASSES))
+        angles, distances = self.kernels.nearest(
+            self._constants, self.sides[mode], x[..., None], y[..., None], lower, upper
+        )
+        distances = np.hypot(distances * self.crank_length, foot[..., :1])
+        order = np.argsort(distances, axis=-1, kind="stable")  # NaN last
+        angles = self._in_range(angles - self.crank_zero)
+        return Passes(
+            np.take_along_axis(angles, order, -1), np.take_along_axis(distances, order, -1)
+        )
+
+    def crank_angles_at(self, y: ArrayLike, assembly_mode: str = "") -> FloatArray:
+        """Return all crank angles at which the foot has a given y (..., k) [rad].
+
+        Args:
+            y: Coordinates along the walking direction (...) [m].
+            assembly_mode: One of `assembly_modes`; "" is "walking".
+
+        Returns:
+            The angles in ascending order, NaN beyond the last; k is the largest number of passes
+            the foot curve allows, 2 for a simple one.
+        """
+        mode = mode_index(self, assembly_mode)  # type: ignore[arg-type]
+        with np.errstate(over="ignore"):
+            x = -as_array("y", y)[..., None] / self.crank_length
+        lower, upper, start, end = self._strokes[mode]
+        inside = (np.minimum(start, end) <= x) & (x <= np.maximum(start, end))
+        angles = self.kernels.crossing(
+            self._constants,
+            self.sides[mode],
+            x,
+            np.where(inside, lower, np.nan),
+            np.where(inside, upper, np.nan),
+            np.sign(end - start),
+        )
+        return np.sort(self._in_range(angles - self.crank_zero), axis=-1)
+
+    def _foot_in_plane(self, mode: int, angles: FloatArray) -> FloatArray:
+        """Return the foot's X, Y and dX in the linkage's plane, in cranks (..., 3)."""
+        foot: FloatArray = self.kernels.foot_in_plane(
+            self._constants, self.sides[mode], angles, np.zeros(3)
+        )
+        return foot
+
+    def _closing_ranges(self, mode: int) -> list[tuple[float, float]]:
+        """Return the crank angles between which the bars close; (0, 2 pi) for a whole turn."""
+        step = TURN / CURVE_SAMPLES
+        angles = np.arange(CURVE_SAMPLES) * step
+        closed = np.isfinite(self._foot_in_plane(mode, angles)[:, 0])
+        if closed.all():
+            return [(0.0, TURN)]
+        # one turn that starts and ends where the bars do not close
+        angles = (np.argmin(closed) + np.arange(CURVE_SAMPLES + 1)) * step
+        closed = np.isfinite(self._foot_in_plane(mode, angles)[:, 0])
+        edges = np.flatnonzero(closed[1:] != closed[:-1])
+        ending = closed[edges]
+        inside, outside = angles[edges + ~ending], angles[edges + ending]
+        for _ in range(REFINEMENTS):
+            middle = 0.5 * (inside + outside)
+            closes = np.isfinite(self._foot_in_plane(mode, middle)[:, 0])
+            inside, outside = np.where(closes, middle, inside), np.where(closes, outside, middle)
+        return list(zip(inside[~ending].tolist(), inside[ending].tolist(), strict=False))
+
+    @cached_property
+    def _curves(self) -> tuple[FloatArray, ...]:
+        """Samples of the foot curve by mode: crank angle, X, Y, dX (m, 4).
+
+        A whole turn is sampled evenly and one sample beyond its ends; ranges in which the bars
+        close are sampled more densely towards their ends, where the foot moves as a square root,
+        and stand between samples that are NaN.
+        """
+        return tuple(self._curve(mode) for mode in range(len(self.sides)))
+
+    def _curve(self, mode: int) -> FloatArray:
+        ranges = self._closing_ranges(mode)
+        if ranges == [(0.0, TURN)]:
+            angles = np.arange(-1, CURVE_SAMPLES + 1) * (TURN / CURVE_SAMPLES)
+        else:
+            fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, CURVE_SAMPLES))
+            parts = [np.array([math.nan])]
+            for lower, upper in ranges:
+                parts += [lower + (upper - lower) * fractions, np.array([math.nan])]
+                parts[-2][-1] = upper
+            angles = np.concatenate(parts)
+        return np.column_stack([angles, self._foot_in_plane(mode, angles)])
+
+    @cached_property
+    def _strokes(self) -> tuple[FloatArray, ...]:
+        """Ranges of the crank in which the foot goes one way, by mode.
+
+        Lower and upper angle, X at both (4, k).
+        """
+        return tuple(self._strokes_of(mode) for mode in range(len(self.sides)))
+
+    def _strokes_of(self, mode: int) -> FloatArray:
+        angles, _, _, rate = self._curves[mode].T
+        rising = rate > 0.0
+        inside = np.isfinite(rate)
+        turns = np.flatnonzero(inside[:-1] & inside[1:] & (rising[:-1] != rising[1:]))
+        lower, upper, before = angles[turns], angles[turns + 1], rising[turns]
+        for _ in range(REFINEMENTS):
+            middle = 0.5 * (lower + upper)
+            same = (self._foot_in_plane(mode, middle)[:, 2] > 0.0) == before
+            lower, upper = np.where(same, middle, lower), np.where(same, upper, middle)
+        strokes = []
+        for start, end in self._closing_ranges(mode):
+            knots = upper[(start <= upper) & (upper < end)]
+            whole = end - start == TURN
+            if whole and len(knots):
+                knots = np.append(knots, knots[0] + TURN)
+            elif not whole:
+                knots = np.concatenate([[start], knots, [end]])
+            feet = self._foot_in_plane(mode, knots)[:, 0]
+            strokes.append(np.stack([knots[:-1], knots[1:], feet[:-1], feet[1:]]))
+        return np.concatenate(strokes, axis=-1) if strokes else np.empty((4, 0))
+
+    def _in_range(self, angles: FloatArray) -> FloatArray:
+        """Return angles shifted by whole turns to the turn about the middle of the range."""
+        lower, upper = self.joint_ranges[0]
+        middle = 0.5 * (lower + upper) if math.isfinite(upper - lower) else 0.0
+        shifted: FloatArray = angles - TURN * np.floor((angles - middle) / TURN + 0.5)
+        return shifted
+
+    def _motion(self, posture: Posture) -> Any:
+        return self.kernels.motion(
+            self._constants, posture.closure, posture.joint_positions, np.zeros(3)
+        )
+
+    def jacobian(self, posture: Posture) -> FloatArray:
+        """J of the foot's velocity, v = J q' (..., 3, 1) [m/rad]."""
+        velocity: FloatArray = self._motion(posture)[0]
+        return velocity[..., None]
+
+    def angular_jacobian(self, posture: Posture) -> FloatArray:
+        """J_omega of the foot link's angular velocity, omega = J_omega q' (..., 3, 1)."""
+        turning: FloatArray = self._motion(posture)[2]
+        return turning[..., None]
+
+    def acceleration(
+        self, posture: Posture, joint_velocities: ArrayLike, joint_accelerations: ArrayLike
+    ) -> FloatArray:
+        """Acceleration of the foot (..., 3) [m/s²].
+
+        Args:
+            posture: The leg's posture (...).
+            joint_velocities: Crank velocity (..., 1) [rad/s].
+            joint_accelerations: Crank acceleration (..., 1) [rad/s²].
+        """
+        batch = posture.joint_positions.shape[:-1]
+        rate = as_matching("joint_velocities", joint_velocities, (1,), batch)
+        acceleration = as_matching(
+            "joint_accelerations",
+            joint_accelerations,
+            (1,),
+            np.broadcast_shapes(batch, rate.shape[:-1]),
+        )
+        first, second, _ = self._motion(posture)
+        with np.errstate(all="ignore"):
+            result: FloatArray = first * acceleration + second * rate**2
+        return result
+
+    def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Angles of the passive joints, as excursions from the initial posture (..., p) [rad].
+
+        Counter-clockwise in the linkage's plane, in [-pi, pi).
+        """
+        angles = self._pivot_angles(posture.joint_positions, posture.closure)
+        excursions = angles - self._pivot_angles(np.zeros(1), self.sides[0])
+        wrapped: FloatArray = excursions - TURN * np.floor(excursions / TURN + 0.5)
+        return wrapped
+
+    def _pivot_angles(self, q: FloatArray, sides: FloatArray) -> FloatArray:
+        points = self._points(q, sides)
+        index = self.point_names.index
+        pivot = points[..., [index(p.point) for p in self.pivots], :]
+        first = points[..., [index(p.first) for p in self.pivots], :] - pivot
+        second = points[..., [index(p.second) for p in self.pivots], :] - pivot
+        # cross and dot in the linkage's plane, whose X is -y
+        cross = first[..., 2] * second[..., 1] - first[..., 1] * second[..., 2]
+        dot = first[..., 1] * second[..., 1] + first[..., 2] * second[..., 2]
+        return np.arctan2(cross, dot)
+
+    def linkage(self, posture: Posture) -> Linkage:
+        """Points of the leg in the leg frame and the bars between them."""
+        index = self.point_names.index
+        return Linkage(
+            self.point_names,
+            self._points(posture.joint_positions, posture.closure),
+            tuple(tuple(index(point) for point in bar) for bar in self.bars),
+        )

@@ -1,0 +1,957 @@
+"""`parallel_drive`: the 2RUS+RU parallel-driving leg with a pantograph (Zhang, Jin, Zhang 2017).
+
+Three cranks whose axes are parallel to x move a platform: two outer cranks through rods (2RUS) and
+a centre crank through a universal joint (RU). The platform's point S drives a parallelogram
+(pantograph) that swings about the hip H and magnifies the motion to the foot C.
+
+The paper leaves the assembly to a reference that is not at hand. The geometry is therefore a
+reconstruction, with two fitted crank zero angles as parameters; see the README.
+
+Symbols of the code are the paper's; frame {P} has its origin at the middle of the outer crank axes,
+the leg frame {C} at the hip H, both with the same axes. `u(t) = (0, cos t, sin t)`.
+
+    U_i = R_Di + m_i u(phi_i)                       crank pins, i = 1, 2, 3
+    w   = (sin b, cos b cos a, cos b sin a)         direction U3 -> G of the platform
+    x_d = (cos b, -sin b cos a, -sin b sin a)       direction of the platform's arms
+    S_1,2 = G ± a x_d,  |S_i - U_i| = l_i,          ball joints and rods
+    S = G + l33 (0, -sin a, cos a)                  point that drives the pantograph
+    S - H = p(th3; l4 u(th1) + c u(th2) + lg u(th2 + 90°))
+    C - H = p(th3; (l4 + l5 + l7) u(th1) + l6 u(th2))
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.errors import GeometryError
+from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.mechanism import (
+    Joint,
+    Linkage,
+    Posture,
+    check_geometry,
+    check_limits,
+    geometry_values,
+    mode_index,
+    offset,
+    parameter,
+)
+from leg_kinematics.scalars import included_angle, swing_plane, within, wrapped
+from leg_kinematics.status import Status
+
+REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`
+
+OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
+
+NEWTON_STEPS = 20
+NEWTON_TOLERANCE = 1e-14  # [rad]
+
+
+class Geometry(NamedTuple):
+    """The dimensions under the paper's symbols, in the order of `ParallelDrive`'s fields."""
+
+    d: float
+    h1: float
+    e: float
+    m1: float
+    m3: float
+    l1: float
+    a: float
+    l3: float
+    l33: float
+    ly: float
+    lz: float
+    l4: float
+    c: float
+    lg: float
+    l5: float
+    l6: float
+    l7: float
+    phi1: float
+    phi3: float
+
+
+GEOMETRY_SIZE = len(Geometry._fields)
+
+
+class Branch(NamedTuple):
+    """Signs that tell the solutions of the loop equations apart; each is +1 or -1.
+
+    Attributes:
+        crank: Of d f_i / d q_i for the outer cranks i = 1, 2: the side of the rod.
+        center: Of sin(a + delta3 - phi_3): the side to which centre crank and platform bend.
+        knee: Of sin(th2 - th1): the side to which the pantograph bends.
+        loop: Of det d(f_1, f_2)/d(a, b): which side of the forward singularity.
+    """
+
+    crank_1: float
+    crank_2: float
+    center: float
+    knee: float
+    loop: float
+
+
+class Pose(NamedTuple):
+    """Cosines (c) and sines (s) of every angle of a closed linkage, and its two rods.
+
+    Attributes:
+        c1: Of th1, th2 of the pantograph's bars and th3 of its swing.
+        ca: Of the platform angles a and b.
+        cp1: Of the crank angles phi_1, phi_2, phi_3.
+        x1: Components of the rods U_1 -> S_1 and U_2 -> S_2.
+    """
+
+    c1: float
+    s1: float
+    c2: float
+    s2: float
+    c3: float
+    s3: float
+    ca: float
+    sa: float
+    cb: float
+    sb: float
+    cp1: float
+    sp1: float
+    cp2: float
+    sp2: float
+    cp3: float
+    sp3: float
+    x1: float
+    y1: float
+    z1: float
+    x2: float
+    y2: float
+    z2: float
+
+
+class Gradient(NamedTuple):
+    """Derivatives of f_i = (|S_i - U_i|² - l_i²) / 2 by a, b, q_i and q_3."""
+
+    a: float
+    b: float
+    q: float
+    q3: float
+
+
+# --------------------------------------------------------------------------- scalar mathematics
+
+
+@scalar
+def two_link(
+    y: float, z: float, first: float, second: float, bend: float
+) -> tuple[float, float, float, float]:
+    """Return u(t1), u(t2) of first u(t1) + second u(t2) = (y, z), sign of sin(t2 - t1) given."""
+    square = y * y + z * z
+    along = 0.5 * (square + first * first - second * second) / first
+    across = bend * math.sqrt(square - along * along)
+    c1, s1 = (along * y + across * z) / square, (along * z - across * y) / square
+    return c1, s1, (y - first * c1) / second, (z - first * s1) / second
+
+
+@scalar
+def center_pin(g: Geometry, cp3: float, sp3: float) -> tuple[float, float]:
+    """Return y, z of U3, the pin of the centre crank, in {P}."""
+    return g.e + g.m3 * cp3, -g.h1 + g.m3 * sp3
+
+
+@scalar
+def rod(
+    g: Geometry,
+    side: float,
+    crank: tuple[float, float],
+    center: tuple[float, float],
+    a: tuple[float, float],
+    b: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Return U_i -> S_i from (cos, sin) of the angles; side is +1 for i = 1 and -1 for i = 2."""
+    y, z = center_pin(g, *center)
+    in_plane = g.l3 * b[0] - side * g.a * b[1]
+    return (
+        g.l3 * b[1] + side * (g.a * b[0] - 0.5 * g.d),
+        y + in_plane * a[0] - g.m1 * crank[0],
+        z + in_plane * a[1] - g.m1 * crank[1],
+    )
+
+
+@scalar
+def rod_gradient(
+    g: Geometry,
+    side: float,
+    crank: tuple[float, float],
+    center: tuple[float, float],
+    a: tuple[float, float],
+    b: tuple[float, float],
+    rod: tuple[float, float, float],
+) -> Gradient:
+    """Return the derivatives of f_i."""
+    x, y, z = rod
+    in_plane = g.l3 * b[0] - side * g.a * b[1]
+    return Gradient(
+        in_plane * (z * a[0] - y * a[1]),
+        in_plane * x - (g.l3 * b[1] + side * g.a * b[0]) * (y * a[0] + z * a[1]),
+        g.m1 * (y * crank[1] - z * crank[0]),
+        g.m3 * (z * center[0] - y * center[1]),
+    )
+
+
+@scalar
+def gradients(g: Geometry, p: Pose) -> tuple[Gradient, Gradient]:
+    """Return the derivatives of f_1 and f_2."""
+    center, a, b = (p.cp3, p.sp3), (p.ca, p.sa), (p.cb, p.sb)
+    return (
+        rod_gradient(g, 1.0, (p.cp1, p.sp1), center, a, b, (p.x1, p.y1, p.z1)),
+        rod_gradient(g, -1.0, (p.cp2, p.sp2), center, a, b, (p.x2, p.y2, p.z2)),
+    )
+
+
+@scalar
+def cosine_sine(angle: float) -> tuple[float, float]:
+    """Return (cos, sin)."""
+    return math.cos(angle), math.sin(angle)
+
+
+@scalar
+def pose_of_angles(g: Geometry, q: FloatArray, closure: FloatArray) -> Pose:
+    """Return the pose of known crank angles and closure."""
+    crank_1, crank_2 = cosine_sine(g.phi1 + q[0]), cosine_sine(g.phi1 + q[1])
+    center, a, b = cosine_sine(g.phi3 + q[2]), cosine_sine(closure[0]), cosine_sine(closure[1])
+    c1, s1 = cosine_sine(closure[2])
+    c2, s2 = cosine_sine(closure[3])
+    c3, s3 = cosine_sine(closure[4])
+    x1, y1, z1 = rod(g, 1.0, crank_1, center, a, b)
+    x2, y2, z2 = rod(g, -1.0, crank_2, center, a, b)
+    return Pose(
+        *(c1, s1, c2, s2, c3, s3),
+        *(a[0], a[1], b[0], b[1]),
+        *(crank_1[0], crank_1[1], crank_2[0], crank_2[1], center[0], center[1]),
+        *(x1, y1, z1, x2, y2, z2),
+    )
+
+
+@scalar
+def elevation_guess(g: Geometry, q: float, q3: float) -> float:
+    """Return the angle a that closes the loops when both outer cranks stand at q (then b = 0)."""
+    y, z = center_pin(g, *cosine_sine(g.phi3 + q3))
+    y = g.m1 * math.cos(g.phi1 + q) - y
+    z = g.m1 * math.sin(g.phi1 + q) - z
+    reach = math.sqrt(g.l1 * g.l1 - (0.5 * g.d - g.a) ** 2)
+    return math.atan2(z, y) - included_angle(g.l3, math.hypot(y, z), reach)
+
+
+@scalar
+def newton(
+    g: Geometry, q1: float, q2: float, q3: float, a: float, b: float
+) -> tuple[bool, float, float]:
+    """Solve the two rod equations for (a, b) from a starting point; True if converged."""
+    crank_1, crank_2 = cosine_sine(g.phi1 + q1), cosine_sine(g.phi1 + q2)
+    center = cosine_sine(g.phi3 + q3)
+    for _ in range(NEWTON_STEPS):
+        a_pair, b_pair = cosine_sine(a), cosine_sine(b)
+        r1 = rod(g, 1.0, crank_1, center, a_pair, b_pair)
+        r2 = rod(g, -1.0, crank_2, center, a_pair, b_pair)
+        d1 = rod_gradient(g, 1.0, crank_1, center, a_pair, b_pair, r1)
+        d2 = rod_gradient(g, -1.0, crank_2, center, a_pair, b_pair, r2)
+        f1 = 0.5 * (r1[0] * r1[0] + r1[1] * r1[1] + r1[2] * r1[2] - g.l1 * g.l1)
+        f2 = 0.5 * (r2[0] * r2[0] + r2[1] * r2[1] + r2[2] * r2[2] - g.l1 * g.l1)
+        determinant = d1.a * d2.b - d1.b * d2.a
+        step_a = (f1 * d2.b - f2 * d1.b) / determinant
+        step_b = (f2 * d1.a - f1 * d2.a) / determinant
+        a -= step_a
+        b -= step_b
+        # near the singularity rounding of f keeps the steps from shrinking further
+        rounding = 1e-8 if abs(f1) + abs(f2) < 1e-20 else 0.0
+        if abs(step_a) + abs(step_b) < NEWTON_TOLERANCE + rounding:
+            return True, wrapped(a), wrapped(b)
+    return False, a, b
+
+
+@scalar
+def drive_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
+    """Tell whether the drive lies strictly inside the branch, off its singularities."""
+    f1, f2 = gradients(g, p)
+    # sin of the angle from the centre crank to the platform's arm U3 -> S, times the arm
+    bend = (g.l3 * p.cb * p.sa + g.l33 * p.ca) * p.cp3 - (g.l3 * p.cb * p.ca - g.l33 * p.sa) * p.sp3
+    return (
+        f1.q * branch.crank_1 > 0.0
+        and f2.q * branch.crank_2 > 0.0
+        and bend * branch.center > 0.0
+        and (f1.a * f2.b - f1.b * f2.a) * branch.loop > 0.0
+        and p.cb > 0.0
+    )
+
+
+@scalar
+def walking_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
+    """Tell whether the pantograph lies inside the branch, seen from the foot and from S."""
+    lever_y, lever_z = pantograph_lever(g, p.c2, p.s2)
+    from_foot = p.s2 * p.c1 - p.c2 * p.s1
+    from_drive = lever_z * p.c1 - lever_y * p.s1
+    return from_foot * branch.knee > 0.0 and from_drive * branch.knee > 0.0
+
+
+@scalar
+def solve_platform(g: Geometry, branch: Branch, q: FloatArray) -> tuple[bool, bool, float, float]:
+    """Find the platform pose (a, b) of a branch for given cranks.
+
+    The rod equations have up to four real solutions with b in ±90°. Newton's method from the
+    symmetric pose finds the default branch almost always; its answer counts only if it lies on the
+    branch, otherwise further starting points are tried.
+
+    Returns:
+        Whether the pose was found, whether the rods close in any way, a and b.
+    """
+    q1, q2, q3 = q[0], q[1], q[2]
+    closure = np.zeros(5)
+    closes, a, b = newton(g, q1, q2, q3, elevation_guess(g, 0.5 * (q1 + q2), q3), 0.0)
+    closure[0], closure[1] = a, b
+    if closes and drive_on_branch(g, branch, pose_of_angles(g, q, closure)):
+        return True, True, a, b
+    for i in range(16):
+        for j in range(3):
+            converged, a, b = newton(g, q1, q2, q3, i * math.pi / 8.0, 0.5 * (j - 1))
+            closes = closes or converged
+            closure[0], closure[1] = a, b
+            if converged and drive_on_branch(g, branch, pose_of_angles(g, q, closure)):
+                return True, True, a, b
+    return False, closes, math.nan, math.nan
+
+
+@scalar
+def pantograph_lever(g: Geometry, c2: float, s2: float) -> tuple[float, float]:
+    """Return R1 -> S in the pantograph's plane: c u(th2) + lg u(th2 + 90°)."""
+    return g.c * c2 - g.lg * s2, g.c * s2 + g.lg * c2
+
+
+@scalar
+def outer_crank(
+    g: Geometry, side: float, bend: float, sx: float, sy: float, sz: float
+) -> tuple[float, float, float, float, float]:
+    """Return u(phi_i) of the outer crank whose rod ends at S_i, and the rod: a circle equation."""
+    x = sx - side * 0.5 * g.d
+    square = sy * sy + sz * sz
+    along = 0.5 * (square + g.m1 * g.m1 - g.l1 * g.l1 + x * x) / g.m1
+    across = bend * math.sqrt(square - along * along)
+    c, s = (along * sy - across * sz) / square, (along * sz + across * sy) / square
+    return c, s, x, sy - g.m1 * c, sz - g.m1 * s
+
+
+@scalar
+def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> Pose:
+    """Return the pose that puts the foot at a point of {C}, in closed form; NaN out of reach."""
+    radius = math.hypot(x, z)
+    c3, s3 = -z / radius, -x / radius
+    c1, s1, c2, s2 = two_link(y, -radius, g.l4 + g.l5 + g.l7, g.l6, branch.knee)
+
+    lever_y, lever_z = pantograph_lever(g, c2, s2)
+    s_zeta = g.l4 * s1 + lever_z
+    sx, sy, sz = s_zeta * s3, g.ly + g.l4 * c1 + lever_y, -g.lz + s_zeta * c3
+
+    sb = sx / g.l3
+    cb = math.sqrt(1.0 - sb * sb)
+    reach = g.l3 * cb
+    arm = math.hypot(reach, g.l33)
+    cp3, sp3, ce, se = two_link(sy - g.e, sz + g.h1, g.m3, arm, branch.center)
+    ca, sa = (ce * reach + se * g.l33) / arm, (se * reach - ce * g.l33) / arm
+
+    gy, gz = sy + g.l33 * sa, sz - g.l33 * ca
+    along, across = g.a * cb, g.a * sb
+    cp1, sp1, x1, y1, z1 = outer_crank(
+        g, 1.0, branch.crank_1, sx + along, gy - across * ca, gz - across * sa
+    )
+    cp2, sp2, x2, y2, z2 = outer_crank(
+        g, -1.0, branch.crank_2, sx - along, gy + across * ca, gz + across * sa
+    )
+    return Pose(
+        *(c1, s1, c2, s2, c3, s3),
+        *(ca, sa, cb, sb),
+        *(cp1, sp1, cp2, sp2, cp3, sp3),
+        *(x1, y1, z1, x2, y2, z2),
+    )
+
+
+@scalar
+def angles_of_pose(g: Geometry, p: Pose, q: FloatArray, closure: FloatArray) -> None:
+    """Fill the crank angles (3,) and the closure a, b, th1, th2, th3 of a pose."""
+    q[0] = wrapped(math.atan2(p.sp1, p.cp1) - g.phi1)
+    q[1] = wrapped(math.atan2(p.sp2, p.cp2) - g.phi1)
+    q[2] = wrapped(math.atan2(p.sp3, p.cp3) - g.phi3)
+    closure[0] = math.atan2(p.sa, p.ca)
+    closure[1] = math.asin(p.sb)
+    closure[2] = math.atan2(p.s1, p.c1)
+    closure[3] = math.atan2(p.s2, p.c2)
+    closure[4] = math.atan2(p.s3, p.c3)
+
+
+@scalar
+def pantograph_of_drive(
+    g: Geometry, knee: float, q3: float, a: float, b: float
+) -> tuple[float, float, float]:
+    """Return th1, th2, th3 of the pantograph that the platform pose (a, b) drives."""
+    y, z = center_pin(g, *cosine_sine(g.phi3 + q3))
+    sx = g.l3 * math.sin(b)
+    sy = y + g.l3 * math.cos(b) * math.cos(a) - g.l33 * math.sin(a)
+    sz = z + g.l3 * math.cos(b) * math.sin(a) + g.l33 * math.cos(a)
+    th3, s_zeta = swing_plane(sx, sz + g.lz)
+    lever, lever_angle = math.hypot(g.c, g.lg), math.atan2(g.lg, g.c)
+    c1, s1, c, s = two_link(sy - g.ly, s_zeta, g.l4, lever, knee)
+    return math.atan2(s1, c1), wrapped(math.atan2(s, c) - lever_angle), th3
+
+
+@scalar
+def foot_point(g: Geometry, th1: float, th2: float, th3: float) -> tuple[float, float, float]:
+    """Return the foot C in {C}."""
+    upper = g.l4 + g.l5 + g.l7
+    zeta = upper * math.sin(th1) + g.l6 * math.sin(th2)
+    y = upper * math.cos(th1) + g.l6 * math.cos(th2)
+    return zeta * math.sin(th3), y, zeta * math.cos(th3)
+
+
+@scalar
+def in_platform(p: Pose, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return the components of a vector along x_d, y_d and w."""
+    radial = y * p.ca + z * p.sa
+    return x * p.cb - radial * p.sb, y * p.sa - z * p.ca, x * p.sb + radial * p.cb
+
+
+@scalar
+def axis_angles(p: Pose) -> tuple[float, float, float]:
+    """Return the angles of U1, U2, U3 about their axes along the cranks', from the cranks."""
+    return (
+        math.atan2(p.cp1 * p.z1 - p.sp1 * p.y1, p.cp1 * p.y1 + p.sp1 * p.z1),
+        math.atan2(p.cp2 * p.z2 - p.sp2 * p.y2, p.cp2 * p.y2 + p.sp2 * p.z2),
+        math.atan2(p.cp3 * p.sa - p.sp3 * p.ca, p.cp3 * p.ca + p.sp3 * p.sa),
+    )
+
+
+@scalar
+def chord(p: Pose, x: float, y: float, z: float, rest: FloatArray) -> float:
+    """Return |v - v_rest|² of a unit vector v seen from the platform; rises with their angle."""
+    vx, vy, vz = in_platform(p, x, y, z)
+    return (vx - rest[0]) ** 2 + (vy - rest[1]) ** 2 + (vz - rest[2]) ** 2
+
+
+@scalar
+def passive_measures(
+    g: Geometry, p: Pose, rest: FloatArray
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return a measure of each passive joint that rises with its excursion, cheaply.
+
+    U1, U2, U3 by two axes: the angle along, left from its rest, and the sine of the angle across.
+    S1, S2 and S: the squared chord of the cone angle in the platform, of the rods and of B -> S.
+    """
+    along_1, along_2, along_3 = axis_angles(p)
+    return (
+        wrapped(along_1 - rest[0]),
+        p.x1 / g.l1,
+        wrapped(along_2 - rest[1]),
+        p.x2 / g.l1,
+        wrapped(along_3 - rest[2]),
+        p.sb,
+        chord(p, p.x1 / g.l1, p.y1 / g.l1, p.z1 / g.l1, rest[3:6]),
+        chord(p, p.x2 / g.l1, p.y2 / g.l1, p.z2 / g.l1, rest[6:9]),
+        chord(p, p.c2 * p.s3, -p.s2, p.c2 * p.c3, rest[9:12]),
+    )
+
+
+@scalar
+def status_of_pose(
+    g: Geometry,
+    branch: Branch,
+    rest: FloatArray,
+    limits: FloatArray,
+    passive_limits: FloatArray,
+    q: FloatArray,
+    p: Pose,
+) -> int:
+    """Return the status of a solved point."""
+    if not (math.isfinite(p.cp1 + p.cp2 + p.cp3) and math.isfinite(p.c1)):
+        return UNREACHABLE
+    if not (drive_on_branch(g, branch, p) and walking_on_branch(g, branch, p)):
+        return SINGULAR
+    for i in range(3):
+        if not within(q[i], limits[i]):
+            return JOINT_LIMIT
+    measures = passive_measures(g, p, rest)
+    for joint in range(9):
+        if not within(measures[joint], passive_limits[joint]):
+            return PASSIVE_JOINT_LIMIT
+    return OK
+
+
+@scalar
+def walking_rates(
+    g: Geometry, p: Pose, f1: Gradient, f2: Gradient, crank: int
+) -> tuple[float, float, float]:
+    """Return the derivatives of th1, th2, th3 by crank 0, 1 or 2.
+
+    Implicit differentiation of the rod equations gives (a', b'), hence S', and S' fixes the rates
+    of the pantograph; this is J_2 and J_3 of equation (2) in one pass.
+    """
+    g1 = f1.q if crank == 0 else (f1.q3 if crank == 2 else 0.0)
+    g2 = f2.q if crank == 1 else (f2.q3 if crank == 2 else 0.0)
+    determinant = f1.a * f2.b - f1.b * f2.a
+    a_rate = (g2 * f1.b - g1 * f2.b) / determinant
+    b_rate = (g1 * f2.a - g2 * f1.a) / determinant
+
+    pin_y, pin_z = (-g.m3 * p.sp3, g.m3 * p.cp3) if crank == 2 else (0.0, 0.0)
+    reach = g.l3 * p.cb
+    x_rate = reach * b_rate
+    y_rate = pin_y - (reach * p.sa + g.l33 * p.ca) * a_rate - g.l3 * p.sb * p.ca * b_rate
+    z_rate = pin_z + (reach * p.ca - g.l33 * p.sa) * a_rate - g.l3 * p.sb * p.sa * b_rate
+
+    # l4 u'(th1) th1' + (c u'(th2) + lg u'(th2 + 90°)) th2' = (s_y', s_zeta')
+    lever_y, lever_z = pantograph_lever(g, p.c2, p.s2)
+    y1, z1 = -g.l4 * p.s1, g.l4 * p.c1
+    y2, z2 = -lever_z, lever_y
+    pantograph = y1 * z2 - y2 * z1
+    zeta_rate = p.s3 * x_rate + p.c3 * z_rate
+    return (
+        (y_rate * z2 - zeta_rate * y2) / pantograph,
+        (zeta_rate * y1 - y_rate * z1) / pantograph,
+        (p.c3 * x_rate - p.s3 * z_rate) / (g.l4 * p.s1 + lever_z),
+    )
+
+
+@scalar
+def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArray) -> None:
+    """Fill J of equation (1), foot velocity, and J_omega of (2), angular velocity of R2C."""
+    f1, f2 = gradients(g, p)
+    upper = g.l4 + g.l5 + g.l7
+    zeta = upper * p.s1 + g.l6 * p.s2
+    for k in range(3):
+        rate_1, rate_2, rate_3 = walking_rates(g, p, f1, f2, k)
+        y_rate = -upper * p.s1 * rate_1 - g.l6 * p.s2 * rate_2
+        zeta_rate = upper * p.c1 * rate_1 + g.l6 * p.c2 * rate_2
+        jacobian[0, k] = zeta_rate * p.s3 + zeta * p.c3 * rate_3
+        jacobian[1, k] = y_rate
+        jacobian[2, k] = zeta_rate * p.c3 - zeta * p.s3 * rate_3
+        angular[0, k] = rate_1 * p.c3
+        angular[1, k] = rate_3
+        angular[2, k] = -rate_1 * p.s3
+
+
+# --------------------------------------------------------------------------- kernels
+
+
+@scalar
+def solve_foot(
+    g: Geometry,
+    branch: Branch,
+    rest: FloatArray,
+    limits: FloatArray,
+    passive_limits: FloatArray,
+    foot: FloatArray,
+    q: FloatArray,
+    closure: FloatArray,
+) -> tuple[int, Pose]:
+    """Solve a foot position: fill crank angles and closure, return status and pose."""
+    pose = pose_of_foot(g, branch, foot[0], foot[1], foot[2])
+    angles_of_pose(g, pose, q, closure)
+    status = status_of_pose(g, branch, rest, limits, passive_limits, q, pose)
+    if not (math.isfinite(foot[0]) and math.isfinite(foot[1]) and math.isfinite(foot[2])):
+        status = INVALID_INPUT
+    if status in (UNREACHABLE, INVALID_INPUT):
+        q[:] = math.nan
+        closure[:] = math.nan
+    return status, pose
+
+
+@kernel(
+    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),()",
+    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
+)
+def _inverse(geometry, signs, rest, limits, passive_limits, foot, shape, q, closure, status):
+    """Foot position in {C} to crank angles and closure; `shape` only sets the closure's length."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    status[0], _ = solve_foot(g, branch, rest, limits, passive_limits, foot, q, closure)
+
+
+@kernel(
+    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),(),(n,n),(n,n)",
+    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
+)
+def _inverse_with_jacobians(
+    geometry, signs, rest, limits, passive_limits, foot, shape, q, closure, status, j, j_omega
+):
+    """`_inverse` and both Jacobians of the solved pose in one pass."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    status[0], pose = solve_foot(g, branch, rest, limits, passive_limits, foot, q, closure)
+    fill_jacobians(g, pose, j, j_omega)
+
+
+@kernel(
+    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),()",
+    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
+)
+def _forward(geometry, signs, rest, limits, passive_limits, q, shape, foot, closure, status):
+    """Crank angles to foot position in {C} and closure."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    foot[:] = math.nan
+    closure[:] = math.nan
+    if not (math.isfinite(q[0]) and math.isfinite(q[1]) and math.isfinite(q[2])):
+        status[0] = INVALID_INPUT
+        return
+    found, closes, a, b = solve_platform(g, branch, q)
+    if not found:
+        status[0] = SINGULAR if closes else UNREACHABLE
+        return
+    th1, th2, th3 = pantograph_of_drive(g, branch.knee, q[2], a, b)
+    if not math.isfinite(th1 + th2):
+        status[0] = UNREACHABLE
+        return
+    closure[0], closure[1], closure[2], closure[3], closure[4] = a, b, th1, th2, th3
+    foot[0], foot[1], foot[2] = foot_point(g, th1, th2, th3)
+    pose = pose_of_angles(g, q, closure)
+    status[0] = status_of_pose(g, branch, rest, limits, passive_limits, q, pose)
+
+
+@kernel("(g),(n),(c)->(n,n),(n,n)", "f8[:], f8[:], f8[:], f8[:,:], f8[:,:]")
+def _jacobians(geometry, q, closure, jacobian, angular):
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
+
+
+@kernel("(g),(n),(c),(r)->(r)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
+def _passive_rest(geometry, q, closure, shape, rest):
+    """What `passive_measures` compares with: three angles and three vectors in the platform."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    p = pose_of_angles(g, q, closure)
+    rest[0], rest[1], rest[2] = axis_angles(p)
+    rest[3], rest[4], rest[5] = in_platform(p, p.x1 / g.l1, p.y1 / g.l1, p.z1 / g.l1)
+    rest[6], rest[7], rest[8] = in_platform(p, p.x2 / g.l1, p.y2 / g.l1, p.z2 / g.l1)
+    rest[9], rest[10], rest[11] = in_platform(p, p.c2 * p.s3, -p.s2, p.c2 * p.c3)
+
+
+@kernel("(g),(r),(n),(c),(p)->(p)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
+def _passive_measures(geometry, rest, q, closure, shape, result):
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    measures = passive_measures(g, pose_of_angles(g, q, closure), rest)
+    for joint in range(9):
+        result[joint] = measures[joint]
+
+
+# --------------------------------------------------------------------------- mechanism
+
+ACROSS, CONES = [1, 3, 5], [6, 7, 8]  # passive joints told by a sine and by a chord
+RANGE = math.radians(21.0)
+PASSIVE_RANGE = math.radians(45.0)
+FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
+
+
+def _mode_names() -> tuple[str, ...]:
+    """Return "initial" and the 15 modes named after the bends that differ from it."""
+    flips = [
+        "+".join(name for name, flip in zip(FLIPPABLE, bits, strict=True) if flip)
+        for bits in product((False, True), repeat=len(FLIPPABLE))
+    ]
+    return ("initial", *(f"flipped_{name}" for name in flips[1:]))
+
+
+@dataclass(frozen=True)
+class ParallelDrive:
+    """The parallel-driving leg; defaults are the paper's initial dimensions.
+
+    The foot position is that of C in the leg frame {C}, whose origin is the hip H.
+
+    Raises:
+        GeometryError: If a dimension is impossible or the leg cannot be assembled.
+    """
+
+    name: ClassVar[str] = "parallel_drive"
+    joints: ClassVar[tuple[Joint, ...]] = (Joint("crank_1"), Joint("crank_2"), Joint("crank_3"))
+    passive_joints: ClassVar[tuple[Joint, ...]] = tuple(
+        Joint(n)
+        for n in (
+            *("u1_along", "u1_across", "u2_along", "u2_across", "u3_along", "u3_across"),
+            *("s1_cone", "s2_cone", "s_cone"),
+        )
+    )
+    closure_names: ClassVar[tuple[str, ...]] = (
+        *("platform_elevation", "platform_tilt"),
+        *("thigh_angle", "link_angle", "swing_angle"),
+    )
+    assembly_modes: ClassVar[tuple[str, ...]] = _mode_names()
+    task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
+
+    crank_spacing: float = parameter("distance R_D1 R_D2 of the outer cranks", "d", "length", 0.276)
+    center_crank_drop: float = offset("depth of R_D3 below the outer crank axis", "h1", 0.070)
+    center_crank_forward: float = offset("y of R_D3", "e", 0.0)
+    crank_length: float = parameter("outer cranks R_Di U_i", "m1", "length", 0.200)
+    center_crank_length: float = parameter("centre crank R_D3 U3", "m3", "length", 0.200)
+    rod_length: float = parameter("rods U_i S_i", "l1", "length", 0.220)
+    platform_arm: float = parameter("arms S_i G of the platform", "a", "length", 0.055)
+    platform_length: float = parameter("platform U3 G", "l3", "length", 0.250)
+    platform_post: float = parameter("post G S of the platform", "l33", "length", 0.120)
+    hip_forward: float = offset("y of the hip H from the crank axis", "l_y", 0.190)
+    hip_drop: float = offset("depth of the hip H below the crank axis", "l_z", 0.055)
+    thigh_upper: float = parameter("R4 R1", "l4", "length", 0.200)
+    drive_lever: float = parameter("connecting link R1 B", "c", "length", 0.110)
+    drive_lever_offset: float = offset("S B, perpendicular to R1 R2", "l_g", 0.0465)
+    thigh_lower: float = parameter("R1 R3", "l5", "length", 0.200)
+    parallelogram_link: float = parameter("long link R1 R2", "l6", "length", 0.300)
+    shank_length: float = parameter("shank R5 C", "l7", "length", 0.450)
+    crank_zero: float = parameter(
+        "outer cranks' zero from +y towards +z (fitted)", "phi_1", "angle", math.radians(-36.0)
+    )
+    center_crank_zero: float = parameter(
+        "centre crank's zero from +y towards +z (fitted)", "phi_3", "angle", math.radians(-106.0)
+    )
+
+    joint_ranges: tuple[tuple[float, float], ...] = ((-RANGE, RANGE),) * 3
+    passive_joint_ranges: tuple[tuple[float, float], ...] = (
+        *((-PASSIVE_RANGE, PASSIVE_RANGE),) * 6,
+        *((0.0, PASSIVE_RANGE),) * 3,
+    )
+
+    def __post_init__(self) -> None:
+        """Check the dimensions by assembling the initial posture."""
+        check_geometry(self)
+        check_limits("joint_ranges", self.joint_ranges, self.joints)
+        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        self._initial  # noqa: B018  raises GeometryError
+
+    @cached_property
+    def joint_limits(self) -> FloatArray:
+        """Ranges of the cranks about their zero (3, 2) [rad]."""
+        return np.array(self.joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def passive_joint_limits(self) -> FloatArray:
+        """Ranges of the passive joints as excursions from the initial posture (9, 2) [rad]."""
+        return np.array(self.passive_joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def _geometry(self) -> FloatArray:
+        return geometry_values(self)
+
+    @cached_property
+    def _initial(self) -> tuple[FloatArray, FloatArray]:
+        """Closure of the initial posture (all cranks at zero) and its branch signs."""
+        g = Geometry(*self._geometry)
+        if not abs(0.5 * g.d - g.a) < g.l1:
+            raise GeometryError(
+                f"rod_length (l1) = {g.l1} m does not span half the crank spacing less the "
+                f"platform arm, |d/2 - a| = {abs(0.5 * g.d - g.a)} m"
+            )
+        a, b, q = elevation_guess(g, 0.0, 0.0), 0.0, np.zeros(3)
+        if math.isnan(a):
+            raise GeometryError(
+                "with all cranks at zero the rods (l1), cranks (m1, m3) and platform (l3) do not "
+                "close a loop: change one of these lengths or the crank zeros (phi_1, phi_3)"
+            )
+        a = wrapped(a)
+        th1, th2, th3 = pantograph_of_drive(g, 1.0, 0.0, a, b)
+        if math.isnan(th1):
+            raise GeometryError(
+                f"with all cranks at zero the pantograph's thigh (l4 = {g.l4} m) and lever "
+                f"(c, l_g: {math.hypot(g.c, g.lg):.4f} m) do not join the hip H and the platform's "
+                "drive point S"
+            )
+        closure = np.array([a, b, th1, th2, th3])
+        pose = pose_of_angles(g, q, closure)
+        f1, f2 = gradients(g, pose)
+        center = math.sin(a + math.atan2(g.l33, g.l3) - g.phi3)
+        knee = math.sin(th2 - th1)
+        signs = np.sign([f1.q, f2.q, center, knee, f1.a * f2.b - f1.b * f2.a])
+        if np.any(signs == 0.0) or knee < 0.0:
+            raise GeometryError("the posture with all cranks at zero is singular")
+        return closure, signs
+
+    @cached_property
+    def _rest(self) -> FloatArray:
+        """What the passive joints' excursions are measured from."""
+        return _passive_rest(self._geometry, np.zeros(3), self._initial[0], np.zeros(REST_SIZE))
+
+    @cached_property
+    def _across_rest(self) -> FloatArray:
+        """Angles across the cranks of U1, U2, U3 in the initial posture (3,) [rad]."""
+        measures = _passive_measures(
+            self._geometry, self._rest, np.zeros(3), self._initial[0], np.zeros(9)
+        )
+        return np.arcsin(measures[ACROSS])
+
+    @cached_property
+    def _passive_bounds(self) -> FloatArray:
+        """Limits of the passive joints in the terms of `passive_measures` (9, 2)."""
+        bounds = self.passive_joint_limits.copy()
+        across = bounds[ACROSS] + self._across_rest[:, None]
+        bounds[ACROSS] = np.sin(np.clip(across, -0.5 * np.pi, 0.5 * np.pi))
+        cone = np.clip(bounds[CONES], 0.0, np.pi)
+        bounds[CONES] = (2.0 * np.sin(0.5 * cone)) ** 2
+        return bounds
+
+    def _branch(self, assembly_mode: str) -> FloatArray:
+        """Return the branch signs of an assembly mode."""
+        index = mode_index(self, assembly_mode)
+        flips = [name for k, name in enumerate(FLIPPABLE) if index >> (3 - k) & 1]
+        sign = {name: -1.0 if name in flips else 1.0 for name in FLIPPABLE}
+        # Flipping the platform's bend turns the platform over, and with it the loop's orientation.
+        flip = [sign["crank_1"], sign["crank_2"], sign["center"], sign["knee"], sign["center"]]
+        return self._initial[1] * flip
+
+    def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
+        return (
+            self._geometry,
+            self._branch(assembly_mode),
+            self._rest,
+            self.joint_limits,
+            self._passive_bounds,
+        )
+
+    @cached_property
+    def initial_posture(self) -> Posture:
+        """The posture with all cranks at zero."""
+        return self.forward(np.zeros(3))
+
+    def forward(self, joint_positions: ArrayLike, assembly_mode: str = "") -> Posture:
+        """Solve for the foot.
+
+        Args:
+            joint_positions: Crank angles about their zeros (..., 3) [rad].
+            assembly_mode: One of `assembly_modes`; "" is "initial".
+
+        Returns:
+            The posture; NaN where the cranks admit none of this mode. Within the actuator ranges
+            the mode's solution is unique; beyond the drive's singularity the status is SINGULAR.
+        """
+        q = as_array("joint_positions", joint_positions, 3)
+        foot, closure, status = _forward(*self._parameters(assembly_mode), q, np.zeros(5))
+        return Posture(q, closure, foot, status)
+
+    def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
+        """Solve for the cranks, in closed form.
+
+        Args:
+            foot_position: Foot C in the leg frame (..., 3) [m].
+            assembly_mode: One of `assembly_modes`; "" is "initial".
+
+        Returns:
+            The posture; NaN where the foot is out of reach.
+        """
+        foot = as_array("foot_position", foot_position, 3)
+        q, closure, status = _inverse(*self._parameters(assembly_mode), foot, np.zeros(5))
+        return Posture(q, closure, foot, status)
+
+    def inverse_with_jacobians(
+        self, foot_position: ArrayLike, assembly_mode: str = ""
+    ) -> tuple[Posture, FloatArray, FloatArray]:
+        """`inverse`, `jacobian` and `angular_jacobian` in one pass, for half the price."""
+        foot = as_array("foot_position", foot_position, 3)
+        q, closure, status, jacobian, angular = _inverse_with_jacobians(
+            *self._parameters(assembly_mode), foot, np.zeros(5)
+        )
+        return Posture(q, closure, foot, status), jacobian, angular
+
+    def jacobian(self, posture: Posture) -> FloatArray:
+        """J of the foot's velocity, v = J q' (..., 3, 3) [m/rad]; equation (1)."""
+        return _jacobians(self._geometry, posture.joint_positions, posture.closure)[0]
+
+    def angular_jacobian(self, posture: Posture) -> FloatArray:
+        """J_omega of the shank's angular velocity, omega = J_omega q' (..., 3, 3); equation (2)."""
+        return _jacobians(self._geometry, posture.joint_positions, posture.closure)[1]
+
+    def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Excursions of the passive joints from the initial posture (..., 9) [rad].
+
+        Universal joints by their two axes (along: the axis parallel to the crank's; across), the
+        spherical joints by a cone angle in the platform: of the rods, and of B -> S for the ball
+        S that drives the pantograph.
+        """
+        measures = _passive_measures(
+            self._geometry, self._rest, posture.joint_positions, posture.closure, np.zeros(9)
+        )
+        angles = measures.copy()
+        angles[..., ACROSS] = np.arcsin(measures[..., ACROSS]) - self._across_rest
+        angles[..., CONES] = 2.0 * np.arcsin(0.5 * np.sqrt(measures[..., CONES]))
+        return angles
+
+    def constraint_jacobian(self, posture: Posture) -> FloatArray:
+        """J_c of the drive's constraint wrenches (..., 3, 6): equations (8), (12), (13).
+
+        Rows are the constraint wrenches of the RU limb at G, a force part (3) [1] then a moment
+        part (3) [1 for the first row, m for the others]: a pure moment about
+        n1 = s_q2 x s_q3 and two forces through U3 along s_q2 (the x axis) and
+        n2 = (s_q1 x n3) x s_q2 = n3, the direction of the centre crank.
+        """
+        a, b = posture.closure[..., 0], posture.closure[..., 1]
+        phi3 = self.center_crank_zero + posture.joint_positions[..., 2]
+        zero, one = np.zeros_like(a), np.ones_like(a)
+        n1 = np.stack([zero, np.cos(a), np.sin(a)], axis=-1)
+        s_q2 = np.stack([one, zero, zero], axis=-1)
+        n2 = np.stack([zero, np.cos(phi3), np.sin(phi3)], axis=-1)
+        w = np.stack([np.sin(b), np.cos(b) * np.cos(a), np.cos(b) * np.sin(a)], axis=-1)
+        to_pin = -self.platform_length * w
+        force = np.stack([np.zeros_like(n1), s_q2, n2], axis=-2)
+        moment = np.stack([n1, np.cross(to_pin, s_q2), np.cross(to_pin, n2)], axis=-2)
+        return np.concatenate([force, moment], axis=-1)
+
+    def linkage(self, posture: Posture) -> Linkage:
+        """Points of the leg in the leg frame and the bars between them."""
+        g = Geometry(*self._geometry)
+        q = np.moveaxis(posture.joint_positions, -1, 0)
+        a, b, th1, th2, th3 = np.moveaxis(posture.closure, -1, 0)
+
+        def vector(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> FloatArray:
+            return np.stack(np.broadcast_arrays(x, y, z, a)[:3], axis=-1)
+
+        def in_plane(length: float, angle: FloatArray) -> FloatArray:
+            """Vector of the pantograph's plane, swung by th3: p(th3; length u(angle))."""
+            zeta = length * np.sin(angle)
+            return vector(zeta * np.sin(th3), length * np.cos(angle), zeta * np.cos(th3))
+
+        hip = vector(0.0, g.ly, -g.lz)
+        drives = [vector(0.5 * g.d, 0, 0), vector(-0.5 * g.d, 0, 0), vector(0.0, g.e, -g.h1)]
+        zeros, lengths = (g.phi1, g.phi1, g.phi3), (g.m1, g.m1, g.m3)
+        pins = [
+            drives[i] + lengths[i] * vector(0.0, np.cos(zeros[i] + q[i]), np.sin(zeros[i] + q[i]))
+            for i in range(3)
+        ]
+        w = vector(np.sin(b), np.cos(b) * np.cos(a), np.cos(b) * np.sin(a))
+        arm = g.a * vector(np.cos(b), -np.sin(b) * np.cos(a), -np.sin(b) * np.sin(a))
+        center = pins[2] + g.l3 * w
+        drive_point = center + g.l33 * vector(0.0, -np.sin(a), np.cos(a))
+        r1 = hip + in_plane(g.l4, th1)
+        r3 = r1 + in_plane(g.l5, th1)
+        points = {
+            "R_D1": drives[0],
+            "R_D2": drives[1],
+            "R_D3": drives[2],
+            "U1": pins[0],
+            "U2": pins[1],
+            "U3": pins[2],
+            "S1": center + arm,
+            "S2": center - arm,
+            "G": center,
+            "S": drive_point,
+            "H": hip,
+            "R1": r1,
+            "B": r1 + in_plane(g.c, th2),
+            "R2": r1 + in_plane(g.l6, th2),
+            "R3": r3,
+            "R5": r3 + in_plane(g.l6, th2),
+            "C": r3 + in_plane(g.l6, th2) + in_plane(g.l7, th1),
+        }
+        names = tuple(points)
+        bars = (
+            *(("R_D1", "U1", "S1", "G"), ("R_D2", "U2", "S2", "G"), ("R_D3", "U3", "G", "S")),
+            *(("S", "B"), ("H", "R1", "R3"), ("R1", "B", "R2"), ("R3", "R5"), ("R2", "R5", "C")),
+        )
+        return Linkage(
+            names,
+            np.stack([p - hip for p in points.values()], axis=-2),
+            tuple(tuple(names.index(n) for n in bar) for bar in bars),
+        )

@@ -1,0 +1,305 @@
+"""`theo_jansen`: Theo Jansen's eight-bar leg with one crank (the paradigm of paper 003).
+
+One crank AB drives two rockers on D: the lower one CD through the coupler BC, and the plate D-U-L
+through the coupler BU. C and L carry the foot link C-F-G. Dimensions are ratios to the crank; in
+Jansen's own numbers the crank is 15. In the linkage's plane (see `crank_linkage`):
+
+    B = u(alpha),  D = l_AD u(theta_0)
+    C: dyad B-C-D (k, c);  U: dyad B-U-D (j, b);  L of the rigid triangle D-U-L (b, d, e)
+    F: dyad L-F-C (f, g);  G of the rigid triangle C-F-G (g, i, h)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.dyads import (
+    Point,
+    crank_pin,
+    dyad,
+    dyad_coefficients,
+    fixed,
+    linkage,
+    rigid_point,
+    transmission,
+    triangle_coefficients,
+    turning_rate,
+)
+from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.mechanism import Joint, parameter
+from leg_kinematics.mechanisms.crank_linkage import (
+    ANY_ANGLE,
+    INVALID_INPUT,
+    UNREACHABLE,
+    CrankLinkage,
+    Dyad,
+    Kernels,
+    Pivot,
+    Triangle,
+    approach,
+    bracket_between,
+    flipped_modes,
+    mode_sides,
+    narrowed,
+    side,
+    status_of_crank,
+)
+
+
+class Geometry(NamedTuple):
+    """The dimensions under Jansen's letters, in the order of `TheoJansen`'s fields."""
+
+    crank: float
+    zero: float
+    ad: float
+    theta0: float
+    j: float
+    k: float
+    b: float
+    c: float
+    d: float
+    e: float
+    f: float
+    g: float
+    h: float
+    i: float
+    tolerance: float
+
+
+class Constants(NamedTuple):
+    """What the equations need of the geometry: lengths, D, and L and G within their links."""
+
+    crank: float
+    zero: float
+    dx: float
+    dy: float
+    j: float
+    k: float
+    b: float
+    c: float
+    f: float
+    g: float
+    along_l: float
+    across_l: float
+    along_g: float
+    across_g: float
+
+
+GEOMETRY_SIZE, CONSTANTS_SIZE = len(Geometry._fields), len(Constants._fields)
+
+
+class Points(NamedTuple):
+    """The joints and the foot."""
+
+    a: Point
+    b: Point
+    c: Point
+    d: Point
+    u: Point
+    l: Point  # noqa: E741  the joint L
+    f: Point
+    g: Point
+
+
+# Which way round the dyads are assembled; the signs below are those of the walking leg.
+PARTS = ("lower_rocker", "upper_rocker", "foot")
+WALKING = (
+    -1.0,  # C lies to the right of the line from B to D
+    1.0,  # U to the left of B to D
+    1.0,  # F to the left of L to C
+)
+
+
+@scalar
+def constants_of(g: Geometry) -> Constants:
+    """Return the constants of a geometry; L and G lie to the right of D-U and C-F."""
+    dx, dy = g.ad * math.cos(g.theta0), g.ad * math.sin(g.theta0)
+    along_l, across_l = triangle_coefficients(g.b, g.d, g.e, -1.0)
+    along_g, across_g = triangle_coefficients(g.g, g.i, g.h, -1.0)
+    return Constants(
+        *(g.crank, g.zero, dx, dy, g.j, g.k, g.b, g.c, g.f, g.g),
+        *(along_l, across_l, along_g, across_g),
+    )
+
+
+@linkage
+def linkage_points(
+    k: Constants, sides: FloatArray, angle: float
+) -> tuple[Points, float, float, float]:
+    """Return all points and the `across` coefficients of the dyads at C, U and F."""
+    a, d = fixed(0.0, 0.0), fixed(k.dx, k.dy)
+    b = crank_pin(a, 1.0, angle, 1.0, 0.0)
+    along, across_c = dyad_coefficients(b, d, k.k, k.c, side(sides[0]))
+    c = dyad(b, d, along, across_c)
+    along, across_u = dyad_coefficients(b, d, k.j, k.b, side(sides[1]))
+    u = dyad(b, d, along, across_u)
+    l = rigid_point(d, u, k.along_l, k.across_l)  # noqa: E741
+    along, across_f = dyad_coefficients(l, c, k.f, k.g, side(sides[2]))
+    f = dyad(l, c, along, across_f)
+    g = rigid_point(c, f, k.along_g, k.across_g)
+    return Points(a, b, c, d, u, l, f, g), across_c, across_u, across_f
+
+
+@linkage
+def foot_motion(k: Constants, sides: FloatArray, angle: float) -> Point:
+    """Return the foot G and its derivatives by the crank angle."""
+    points, _, _, _ = linkage_points(k, sides, angle)
+    return points.g
+
+
+# --------------------------------------------------------------------------- kernels
+
+
+@kernel("(g),(c)->(c)", "f8[:], f8[:], f8[:]")
+def constants_of_geometry(geometry, shape, constants):  # type: ignore[no-untyped-def]
+    """Geometry to the constants that the other kernels take; `shape` only sets a length."""
+    k = constants_of(Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE)))
+    for i in range(CONSTANTS_SIZE):
+        constants[i] = k[i]
+
+
+@kernel("(c),(s),(l),(n),(d)->(d),(s),()", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]")
+def _forward(constants, sides, limits, q, shape, foot, closure, status):  # type: ignore[no-untyped-def]
+    """Crank angle to foot in the leg frame, closure and status."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    p, closure[0], closure[1], closure[2] = linkage_points(k, sides, k.zero + q[0])
+    worst = min(
+        transmission(p.b, p.d, closure[0], k.k, k.c),
+        transmission(p.b, p.d, closure[1], k.j, k.b),
+        transmission(p.l, p.c, closure[2], k.f, k.g),
+    )
+    status[0] = status_of_crank(q[0], limits, p.g, worst)
+    foot[0], foot[1], foot[2] = 0.0, -k.crank * p.g.x, k.crank * p.g.y
+    if status[0] == UNREACHABLE or status[0] == INVALID_INPUT:
+        foot[:] = math.nan
+        closure[:] = math.nan
+
+
+@kernel("(c),(s),(n),(d)->(d),(d),(d)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
+def _motion(constants, sides, q, shape, velocity, acceleration, turning):  # type: ignore[no-untyped-def]
+    """First and second derivative of the foot and the foot link's turning by the crank angle."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    p = linkage_points(k, sides, k.zero + q[0])[0]
+    velocity[0], velocity[1], velocity[2] = 0.0, -k.crank * p.g.vx, k.crank * p.g.vy
+    acceleration[0], acceleration[1], acceleration[2] = 0.0, -k.crank * p.g.ax, k.crank * p.g.ay
+    turning[0], turning[1], turning[2] = -turning_rate(p.c, p.f), 0.0, 0.0
+
+
+@kernel("(c),(s),(n),(p,d)->(p,d)", "f8[:], f8[:], f8[:], f8[:,:], f8[:,:]")
+def _points(constants, sides, q, shape, points):  # type: ignore[no-untyped-def]
+    """All points in the leg frame."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    p = linkage_points(k, sides, k.zero + q[0])[0]
+    for i, point in enumerate((p.a, p.b, p.c, p.d, p.u, p.l, p.f, p.g)):
+        points[i, 0], points[i, 1], points[i, 2] = 0.0, -k.crank * point.x, k.crank * point.y
+
+
+@kernel("(c),(s),(),(t)->(t)", "f8[:], f8[:], f8, f8[:], f8[:]")
+def foot_in_plane(constants, sides, angle, shape, result):  # type: ignore[no-untyped-def]
+    """Foot X, Y and dX/dalpha in the linkage's plane and crank lengths."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    p = foot_motion(k, sides, angle)
+    result[0], result[1], result[2] = p.x, p.y, p.vx
+
+
+@kernel("(c),(s),(),(),(),()->(),()", "f8[:], f8[:], f8, f8, f8, f8, f8[:], f8[:]")
+def _nearest(constants, sides, x, y, lower, upper, angle, distance):  # type: ignore[no-untyped-def]
+    """Crank angle in a bracket at which the foot is nearest to (X, Y), and how near."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    bracket = bracket_between(lower, upper)
+    while not bracket.done:
+        p = foot_motion(k, sides, bracket.angle)
+        slope, curvature = approach(p, x, y)
+        bracket = narrowed(bracket, slope, curvature)
+    p = foot_motion(k, sides, bracket.angle)
+    angle[0], distance[0] = bracket.angle, math.hypot(p.x - x, p.y - y)
+
+
+@kernel("(c),(s),(),(),(),()->()", "f8[:], f8[:], f8, f8, f8, f8, f8[:]")
+def _crossing(constants, sides, x, lower, upper, sense, angle):  # type: ignore[no-untyped-def]
+    """Crank angle in a bracket where the foot's X is x; sense is +1 if X rises there, else -1."""
+    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
+    bracket = bracket_between(lower, upper)
+    while not bracket.done:
+        p = foot_motion(k, sides, bracket.angle)
+        bracket = narrowed(bracket, sense * (p.x - x), sense * p.vx)
+    angle[0] = bracket.angle
+
+
+# --------------------------------------------------------------------------- mechanism
+
+
+@dataclass(frozen=True)
+class TheoJansen(CrankLinkage):
+    """Theo Jansen's leg; defaults are his proportions.
+
+    Raises:
+        GeometryError: If a dimension is impossible or the leg cannot be assembled.
+    """
+
+    name: ClassVar[str] = "theo_jansen"
+    passive_joints: ClassVar[tuple[Joint, ...]] = tuple(
+        map(
+            Joint,
+            ("b_upper", "b_lower", "d_upper", "d_lower", "u", "c_coupler", "c_foot", "l", "f"),
+        )
+    )
+    closure_names: ClassVar[tuple[str, ...]] = PARTS
+    assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("walking", PARTS)
+
+    sides: ClassVar[FloatArray] = mode_sides(WALKING)
+    kernels: ClassVar[Kernels] = Kernels(
+        constants_of_geometry, _forward, _motion, _points, foot_in_plane, _nearest, _crossing
+    )
+    constants_size: ClassVar[int] = CONSTANTS_SIZE
+    point_names: ClassVar[tuple[str, ...]] = ("A", "B", "C", "D", "U", "L", "F", "G")
+    dyads: ClassVar[tuple[Dyad, ...]] = (
+        Dyad("C", ("B", "D"), ("lower_coupler", "lower_rocker")),
+        Dyad("U", ("B", "D"), ("upper_coupler", "upper_rocker")),
+        Dyad("F", ("L", "C"), ("link", "foot_lever")),
+    )
+    triangles: ClassVar[tuple[Triangle, ...]] = (
+        Triangle(("D", "U", "L"), ("upper_rocker", "plate_arm", "plate_brace")),
+        Triangle(("C", "F", "G"), ("foot_lever", "foot_bar", "foot_brace")),
+    )
+    pivots: ClassVar[tuple[Pivot, ...]] = (
+        Pivot("b_upper", "B", "A", "U"),
+        Pivot("b_lower", "B", "A", "C"),
+        Pivot("d_upper", "D", "A", "U"),
+        Pivot("d_lower", "D", "A", "C"),
+        Pivot("u", "U", "D", "B"),
+        Pivot("c_coupler", "C", "D", "B"),
+        Pivot("c_foot", "C", "D", "F"),
+        Pivot("l", "L", "D", "F"),
+        Pivot("f", "F", "C", "L"),
+    )
+    bars: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *(("A", "B"), ("B", "U"), ("B", "C"), ("D", "U", "L", "D"), ("C", "D")),
+        *(("L", "F"), ("C", "F", "G", "C")),
+    )
+
+    crank_length: float = parameter("crank A B", "m", "length", 0.015)
+    crank_zero: float = parameter("crank angle at joint position zero", "alpha_0", "angle", 0.0)
+    frame_length: float = parameter("A D, in cranks", "l_AD", "ratio", math.hypot(38, 7.8) / 15)
+    frame_angle: float = parameter("angle of A D", "theta_0", "angle", -math.atan2(7.8, 38))
+    upper_coupler: float = parameter("B U, in cranks", "j", "ratio", 50 / 15)
+    lower_coupler: float = parameter("B C, in cranks", "k", "ratio", 61.9 / 15)
+    upper_rocker: float = parameter("D U, in cranks", "b", "ratio", 41.5 / 15)
+    lower_rocker: float = parameter("D C, in cranks", "c", "ratio", 39.3 / 15)
+    plate_arm: float = parameter("D L, in cranks", "d", "ratio", 40.1 / 15)
+    plate_brace: float = parameter("U L, in cranks", "e", "ratio", 55.8 / 15)
+    link: float = parameter("L F, in cranks", "f", "ratio", 39.4 / 15)
+    foot_lever: float = parameter("C F, in cranks", "g", "ratio", 36.7 / 15)
+    foot_brace: float = parameter("F G, in cranks", "h", "ratio", 65.7 / 15)
+    foot_bar: float = parameter("C G, in cranks", "i", "ratio", 49 / 15)
+    reach_tolerance: float = parameter(
+        "largest distance of a wanted foot position from the foot curve", "-", "length", 0.001
+    )
+
+    joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,)
+    passive_joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,) * 9

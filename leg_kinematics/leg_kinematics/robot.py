@@ -1,0 +1,111 @@
+"""A robot: named legs, each a mechanism mounted on a body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.errors import UnknownNameError
+from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.mirrored import Mirrored
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Where a leg frame stands in the robot's base frame.
+
+    Attributes:
+        position: Origin of the leg frame in the base frame (3,) [m].
+        rotation: Matrix that turns leg coordinates into base coordinates (3, 3).
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+
+    def to_base(self, points: ArrayLike) -> FloatArray:
+        """Turn points (..., 3) of the leg frame into the base frame [m]."""
+        return self.vectors_to_base(points) + self.position
+
+    def to_leg(self, points: ArrayLike) -> FloatArray:
+        """Turn points (..., 3) of the base frame into the leg frame [m]."""
+        return self.vectors_to_leg(as_array("points", points, 3) - self.position)
+
+    def vectors_to_base(self, vectors: ArrayLike) -> FloatArray:
+        """Turn free vectors (..., 3) of the leg frame into the base frame."""
+        return as_array("vectors", vectors, 3) @ self.rotation.T
+
+    def vectors_to_leg(self, vectors: ArrayLike) -> FloatArray:
+        """Turn free vectors (..., 3) of the base frame into the leg frame."""
+        return as_array("vectors", vectors, 3) @ self.rotation
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One leg of a robot.
+
+    Attributes:
+        name: Name within the robot.
+        leg_type: Name of its type in the robot description.
+        mechanism: The mechanism, reflected if the leg is mirrored.
+        mount: The leg frame in the base frame.
+        frame: Name of the leg frame.
+        joint_names: Names of the actuated joints in the robot, in the mechanism's order.
+        effort_limits: Lower and upper effort of each actuator (n, 2) [N.m or N].
+    """
+
+    name: str
+    leg_type: str
+    mechanism: Mechanism
+    mount: Mount
+    frame: str
+    joint_names: tuple[str, ...]
+    effort_limits: FloatArray
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the mechanism is the mirror image of its geometry."""
+        return isinstance(self.mechanism, Mirrored)
+
+    @property
+    def geometry(self) -> Any:
+        """The mechanism's dataclass of dimensions, without the reflection."""
+        return self.mechanism.original if isinstance(self.mechanism, Mirrored) else self.mechanism
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot with named legs.
+
+    Attributes:
+        name: Name of the robot.
+        base_frame: Name of the body's frame.
+        legs: The legs by name, in the order of the description.
+    """
+
+    name: str
+    base_frame: str
+    legs: Mapping[str, Leg]
+
+    def leg(self, name: str) -> Leg:
+        """Return a leg by its name; "" is allowed when there is exactly one.
+
+        Raises:
+            UnknownNameError: If there is no such leg.
+        """
+        if not name and len(self.legs) == 1:
+            return next(iter(self.legs.values()))
+        try:
+            return self.legs[name]
+        except KeyError:
+            raise UnknownNameError("leg", name, self.legs) from None
+
+    def effort_limits(self) -> tuple[tuple[str, ...], FloatArray]:
+        """Return all joint names and their effort limits (sum of n, 2) [N.m or N]."""
+        legs = self.legs.values()
+        names = tuple(name for leg in legs for name in leg.joint_names)
+        return names, np.concatenate([leg.effort_limits for leg in legs])

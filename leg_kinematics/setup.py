@@ -1,0 +1,25 @@
+from setuptools import find_packages, setup
+
+package_name = "leg_kinematics"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + package_name]),
+        ("share/" + package_name, ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Leg Capacity Developers",
+    maintainer_email="maintainers@example.org",
+    description="Kinematics of parallel and hybrid legs, and the node that serves them.",
+    license="Apache-2.0",
+    extras_require={"test": ["pytest"]},
+    entry_points={
+        "console_scripts": [
+            "kinematics_node = leg_kinematics.kinematics_node:main",
+        ],
+    },
+)

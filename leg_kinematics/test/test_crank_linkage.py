@@ -1,0 +1,355 @@
+"""What `TheoJansen` and `SixBar` have in common: lengths, rates, passes of the foot, limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from leg_kinematics import GeometryError, Mechanism, ShapeError, Status, UnknownNameError
+from leg_kinematics.mechanism import geometry_parameters
+from leg_kinematics.mechanisms.six_bar import SixBar
+from leg_kinematics.mechanisms.theo_jansen import TheoJansen
+from leg_kinematics.mirrored import Mirrored
+
+JANSEN, SIX_BAR = TheoJansen(crank_length=0.02), SixBar(crank_length=0.02)
+ODD = TheoJansen(crank_length=0.03, crank_zero=1.1, upper_coupler=3.5, link=2.7, frame_angle=0.1)
+# A coupler so short that the crank cannot turn all the way round.
+SWINGING = SixBar(coupler=1.9, rocker=1.4, rod=3.5)
+
+legs = pytest.mark.parametrize(
+    "leg", [JANSEN, ODD, SIX_BAR, SWINGING], ids=["jansen", "odd", "six_bar", "swinging"]
+)
+turning = pytest.mark.parametrize("leg", [JANSEN, ODD, SIX_BAR], ids=["jansen", "odd", "six_bar"])
+
+TURN = np.linspace(-math.pi, math.pi, 2000, endpoint=False)[:, None]
+
+
+def distances(linkage, first, second):
+    index = linkage.names.index
+    return np.linalg.norm(
+        linkage.points[..., index(first), :] - linkage.points[..., index(second), :], axis=-1
+    )
+
+
+def angle_between(first, second):
+    return np.abs(np.angle(np.exp(1j * (first - second))))
+
+
+def solved(leg, assembly_mode=""):
+    """Postures with a foot, well away from dead points."""
+    posture = leg.forward(TURN, assembly_mode)
+    good = (posture.status == Status.OK) & (np.abs(posture.closure) > 0.02).all(axis=-1)
+    return type(posture)(*(field[good] for field in posture))
+
+
+@legs
+def test_leg_has_every_member_of_the_protocol(leg):
+    members = [m for m in dir(Mechanism) if not m.startswith("_")]
+    members += Mechanism.__annotations__
+    assert all(hasattr(leg, member) for member in members)
+
+
+@legs
+def test_every_bar_keeps_its_length_in_every_mode(leg):
+    for mode in leg.assembly_modes:
+        linkage = leg.linkage(leg.forward(TURN, mode))
+        for dyad in leg.dyads:
+            for end, bar in zip(dyad.ends, dyad.bars, strict=True):
+                found = distances(linkage, dyad.joint, end)
+                found = found[np.isfinite(found)]
+                wanted = getattr(leg, bar) * leg.crank_length
+                np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13)
+        for triangle in leg.triangles:
+            p, q, tip = triangle.points
+            for ends, side in zip(((p, q), (p, tip), (q, tip)), triangle.sides, strict=True):
+                found = distances(linkage, *ends)
+                found = found[np.isfinite(found)]
+                wanted = getattr(leg, side) * leg.crank_length
+                np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13)
+
+
+@legs
+def test_crank_and_frame_stand_where_they_should(leg):
+    linkage = leg.linkage(leg.forward(TURN))
+    index = linkage.names.index
+    angle = leg.crank_zero + TURN[:, 0]
+    pin = np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=-1) * leg.crank_length
+    np.testing.assert_allclose(linkage.points[:, index("B")], pin, atol=1e-15)
+    frame = leg.frame_length * leg.crank_length
+    pivot = [0.0, -frame * math.cos(leg.frame_angle), frame * math.sin(leg.frame_angle)]
+    np.testing.assert_allclose(linkage.points[0, index("D")], pivot, atol=1e-15)
+
+
+@turning
+def test_the_crank_turns_all_the_way_round_and_the_foot_is_g(leg):
+    posture = leg.forward(TURN)
+    assert (posture.status == Status.OK).all()
+    np.testing.assert_array_equal(posture.foot_position, leg.linkage(posture).points[:, -1])
+    np.testing.assert_array_equal(posture.foot_position[:, 0], 0.0)
+
+
+@legs
+def test_jacobian_and_acceleration_are_derivatives(leg):
+    step = 1e-6
+    for mode in (leg.assembly_modes[0], leg.assembly_modes[1]):
+        posture = solved(leg, mode)
+        q = posture.joint_positions
+        before, after = leg.forward(q - step, mode), leg.forward(q + step, mode)
+        slope = (after.foot_position - before.foot_position) / (2 * step)
+        jacobian = leg.jacobian(posture)
+        assert jacobian.shape == (len(q), 3, 1)
+        scale = np.abs(jacobian).max()
+        np.testing.assert_allclose(jacobian[..., 0], slope, rtol=0, atol=2e-7 * scale)
+        slope = (leg.jacobian(after) - leg.jacobian(before))[..., 0] / (2 * step)
+        found = leg.acceleration(posture, [2.0], [0.0])
+        np.testing.assert_allclose(found, 4.0 * slope, rtol=0, atol=2e-6 * np.abs(found).max())
+        found = leg.acceleration(posture, [0.0], [3.0])
+        np.testing.assert_allclose(found, 3.0 * jacobian[..., 0], rtol=1e-14)
+
+
+@legs
+def test_angular_jacobian_is_the_turning_of_the_foot_link(leg):
+    step = 1e-6
+    posture = solved(leg)
+
+    def angle(q):
+        linkage = leg.linkage(leg.forward(q))
+        index = linkage.names.index
+        bar = linkage.points[:, index("F")] - linkage.points[:, index("C")]
+        return np.arctan2(bar[:, 2], bar[:, 1])  # about +x of the leg frame
+
+    q = posture.joint_positions
+    slope = np.angle(np.exp(1j * (angle(q + step) - angle(q - step)))) / (2 * step)
+    found = leg.angular_jacobian(posture)
+    np.testing.assert_allclose(found[:, 0, 0], slope, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(found[:, 1:], 0.0)
+
+
+@legs
+def test_inverse_undoes_forward(leg):
+    for mode in leg.assembly_modes:
+        posture = leg.forward(TURN, mode)
+        good = posture.status == Status.OK
+        assert good.any() or mode != leg.assembly_modes[0]
+        back = leg.inverse(posture.foot_position[good], mode)
+        assert (back.status == Status.OK).all()
+        np.testing.assert_allclose(
+            back.foot_position, posture.foot_position[good], rtol=0, atol=1e-9
+        )
+
+
+@turning
+def test_inverse_finds_the_crank_angle(leg):
+    back = leg.inverse(leg.forward(TURN).foot_position)
+    assert angle_between(back.joint_positions, TURN).max() < 1e-9
+
+
+@legs
+def test_nearest_pass_beats_a_fine_search(leg):
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-7, 3, (40, 3)) * leg.crank_length
+    points[:, 0] *= 0.1
+    passes = leg.nearest_crank_angles(points)
+    feet = leg.forward(np.linspace(-math.pi, math.pi, 40_000)[:, None]).foot_position
+    feet = feet[np.isfinite(feet[:, 1])]
+    least = np.linalg.norm(points[:, None] - feet, axis=-1).min(axis=1)
+    assert (passes.distances[:, 0] <= least + 1e-12).all()
+    there = leg.forward(passes.crank_angles[:, :1]).foot_position
+    np.testing.assert_allclose(
+        np.linalg.norm(there - points, axis=-1), passes.distances[:, 0], atol=1e-12
+    )
+    known = np.nan_to_num(passes.distances, nan=np.inf)
+    assert (known[:, :-1] <= known[:, 1:]).all()
+
+
+@turning
+def test_crank_angles_at_a_y_are_all_its_passes(leg):
+    feet = leg.forward(TURN).foot_position
+    y = np.linspace(feet[:, 1].min() - 0.01, feet[:, 1].max() + 0.01, 101)
+    angles = leg.crank_angles_at(y)
+    reached = (y >= feet[:, 1].min()) & (y <= feet[:, 1].max())
+    ahead = np.append(feet[:, 1], feet[0, 1])[:, None] > y
+    np.testing.assert_array_equal(
+        np.isfinite(angles).sum(axis=-1), (ahead[1:] != ahead[:-1]).sum(axis=0)
+    )
+    assert reached.any()
+    found = leg.forward(angles[..., None]).foot_position[..., 1]
+    np.testing.assert_allclose((found - y[:, None])[np.isfinite(angles)], 0.0, atol=1e-12)
+
+
+def test_crank_angles_at_a_y_where_the_crank_only_swings():
+    feet = SWINGING.forward(TURN).foot_position[:, 1]
+    y = np.linspace(np.nanmin(feet), np.nanmax(feet), 50)[1:-1]
+    angles = SWINGING.crank_angles_at(y)
+    crossings = (feet[:-1, None] < y) != (feet[1:, None] < y)
+    crossings &= np.isfinite(feet[:-1] + feet[1:])[:, None]
+    assert (np.isfinite(angles).sum(axis=-1) >= crossings.sum(axis=0)).all()
+    found = SWINGING.forward(angles[..., None]).foot_position[..., 1]
+    np.testing.assert_allclose((found - y[:, None])[np.isfinite(found)], 0.0, atol=1e-12)
+
+
+@turning
+def test_a_foothold_off_the_curve_is_unreachable(leg):
+    foot = leg.forward([0.4]).foot_position
+    normal = np.cross(leg.jacobian(leg.forward([0.4]))[:, 0], [1.0, 0.0, 0.0])
+    normal /= np.linalg.norm(normal)
+    near, far = (foot + k * leg.reach_tolerance * normal for k in (0.99, 1.01))
+    assert leg.inverse(near).status == Status.OK
+    missed = leg.inverse(far)
+    assert missed.status == Status.UNREACHABLE
+    assert np.isnan(missed.joint_positions).all()
+    assert (
+        leg.inverse(foot + np.array([2 * leg.reach_tolerance, 0, 0])).status == Status.UNREACHABLE
+    )
+
+
+@turning
+def test_a_whole_turn_is_no_limit_and_less_is(leg):
+    assert leg.forward([50.0]).status == Status.OK
+    assert replace(leg, joint_ranges=((-np.inf, np.inf),)).forward([50.0]).status == Status.OK
+    limited = replace(leg, joint_ranges=((0.0, 1.0),))
+    q = np.array([[0.0], [1.0], [1.1], [-0.1]])
+    posture = limited.forward(q)
+    wanted = [Status.OK, Status.OK, Status.JOINT_LIMIT, Status.JOINT_LIMIT]
+    np.testing.assert_array_equal(posture.status, wanted)
+    np.testing.assert_array_equal(limited.inverse(posture.foot_position).status, wanted)
+
+
+@turning
+def test_inverse_answers_within_the_range_of_the_crank(leg):
+    around = replace(leg, joint_ranges=((10.0, 10.0 + 2 * math.pi),))
+    back = around.inverse(leg.forward(TURN).foot_position)
+    assert (back.joint_positions >= 10.0 - 1e-9).all()
+    assert (back.joint_positions <= 10.0 + 2 * math.pi + 1e-9).all()
+
+
+@turning
+def test_passive_joints_start_at_zero_and_limit(leg):
+    excursions = leg.passive_joint_positions(leg.forward(TURN))
+    assert excursions.shape == (len(TURN), len(leg.passive_joints))
+    np.testing.assert_array_equal(leg.passive_joint_positions(leg.initial_posture), 0.0)
+    joint = [j.name for j in leg.passive_joints].index("f")
+    reach = 0.5 * np.abs(excursions[:, joint]).max()
+    ranges = list(leg.passive_joint_ranges)
+    ranges[joint] = (-reach, reach)
+    status = replace(leg, passive_joint_ranges=tuple(ranges)).forward(TURN).status
+    wanted = np.where(np.abs(excursions[:, joint]) > reach, Status.PASSIVE_JOINT_LIMIT, Status.OK)
+    np.testing.assert_array_equal(status, wanted)
+    assert len(np.unique(status)) == 2
+
+
+def test_a_leg_that_swings_is_unreachable_where_its_bars_do_not_close():
+    posture = SWINGING.forward(TURN)
+    open_ = posture.status == Status.UNREACHABLE
+    assert 0 < open_.sum() < len(TURN)
+    assert np.isnan(posture.foot_position[open_]).all()
+    assert np.isnan(posture.closure[open_]).all()
+    assert np.isfinite(posture.foot_position[~open_]).all()
+
+
+def test_a_dead_point_is_singular():
+    # coupler and rocker are in line where BD is as long as both: cosine law of the triangle ABD
+    leg = replace(SWINGING, rod=3.0)
+    frame, both = leg.frame_length, leg.coupler + leg.rocker
+    dead = leg.frame_angle + math.acos((1.0 + frame**2 - both**2) / (2.0 * frame))
+    q = np.array([[dead], [dead - 1e-3], [dead + 1e-3]])
+    wanted = [Status.SINGULAR, Status.OK, Status.UNREACHABLE]
+    np.testing.assert_array_equal(leg.forward(q).status, wanted)
+
+
+@turning
+def test_mirror_image_is_the_leg_itself(leg):
+    mirrored, posture = Mirrored(leg), leg.forward(TURN)
+    np.testing.assert_array_equal(mirrored.forward(TURN).foot_position, posture.foot_position)
+    np.testing.assert_array_equal(mirrored.jacobian(posture), leg.jacobian(posture))
+
+
+@turning
+def test_leading_axes_are_kept(leg):
+    posture = leg.forward(np.zeros((2, 3, 1)))
+    assert posture.foot_position.shape == (2, 3, 3)
+    assert posture.status.shape == (2, 3)
+    assert leg.linkage(posture).points.shape == (2, 3, len(leg.point_names), 3)
+    assert leg.inverse(posture.foot_position).joint_positions.shape == (2, 3, 1)
+    assert leg.crank_angles_at(0.0).ndim == 1
+    assert leg.acceleration(posture, np.zeros((3, 1)), [0.0]).shape == (2, 3, 3)
+    assert leg.forward(np.zeros((0, 1))).foot_position.shape == (0, 3)
+
+
+@turning
+def test_misuse_raises(leg):
+    with pytest.raises(ShapeError, match="joint_positions"):
+        leg.forward(np.zeros(2))
+    with pytest.raises(ShapeError, match="foot_position"):
+        leg.inverse(np.zeros(2))
+    with pytest.raises(UnknownNameError, match="walking"):
+        leg.forward([0.0], "sideways")
+
+
+@turning
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"crank_length": 0.0}, "crank_length .* must be > 0"),
+        ({"frame_length": -1.0}, "frame_length .* must be > 0"),
+        ({"frame_angle": math.nan}, "frame_angle .* must be finite"),
+        ({"foot_brace": 50.0}, "rigid triangle C-F-G does not close"),
+        ({"foot_bar": 1e-9, "foot_brace": 1e-9}, "rigid triangle C-F-G does not close"),
+        ({"frame_length": 30.0}, "do not meet in C"),
+        ({"joint_ranges": ((1.0, 0.0),)}, "joint_ranges of crank"),
+        ({"joint_ranges": ((0.0, math.nan),)}, "joint_ranges of crank"),
+        ({"passive_joint_ranges": ()}, "passive_joint_ranges must be"),
+    ],
+)
+def test_impossible_geometry_is_named(leg, change, message):
+    with pytest.raises(GeometryError, match=message):
+        replace(leg, **change)
+
+
+lengths = st.floats(1e-300, 1e300) | st.floats(0.1, 10.0)
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_any_geometry_raises_a_geometry_error_or_computes(data):
+    kind = data.draw(st.sampled_from([TheoJansen, SixBar]))
+    names = [f.name for f in geometry_parameters(kind)]
+    chosen = data.draw(st.lists(st.sampled_from(names), max_size=3, unique=True))
+    try:
+        leg = kind(**{name: data.draw(lengths) for name in chosen})
+    except GeometryError:
+        return
+    posture = leg.forward(TURN[::50])
+    ok = posture.status == Status.OK
+    assert np.isfinite(posture.foot_position[ok]).all()
+    assert np.isfinite(posture.closure[ok]).all()
+
+
+@settings(max_examples=60)
+@given(
+    hnp.arrays(np.float64, (4, 3), elements=st.floats(allow_nan=True, allow_infinity=True)),
+    st.sampled_from([JANSEN, SIX_BAR, SWINGING]),
+)
+def test_arbitrary_numbers_never_raise_and_ok_is_never_nan(numbers, leg):
+    for mode in leg.assembly_modes[:3]:
+        for posture in (leg.forward(numbers[:, :1], mode), leg.inverse(numbers, mode)):
+            ok = posture.status == Status.OK
+            for field in posture[:3]:
+                assert np.isfinite(field[ok]).all()
+            assert np.isfinite(leg.jacobian(posture)[ok]).all()
+            leg.angular_jacobian(posture)
+            leg.passive_joint_positions(posture)
+            leg.acceleration(posture, numbers[:, 1:2], numbers[:, 2:])
+            leg.linkage(posture)
+        invalid = ~np.isfinite(numbers[:, 0])
+        assert (leg.forward(numbers[:, :1], mode).status[invalid] == Status.INVALID_INPUT).all()
+        invalid = ~np.isfinite(numbers).all(axis=-1)
+        assert (leg.inverse(numbers, mode).status[invalid] == Status.INVALID_INPUT).all()
+        leg.nearest_crank_angles(numbers, mode)
+        leg.crank_angles_at(numbers, mode)

@@ -1,0 +1,91 @@
+"""Kernels: broadcasting, and a cache that notices edits of the code a kernel calls."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import leg_kinematics
+from leg_kinematics.kernel import kernel, scalar
+
+PACKAGES = str(Path(leg_kinematics.__file__).parents[1])
+
+
+@scalar
+def quotient(a, b):
+    return a / b
+
+
+@kernel("(n),()->(n)", "f8[:], f8, f8[:]")
+def divide(vector, divisor, result):
+    for i in range(vector.shape[0]):
+        result[i] = quotient(vector[i], divisor)
+
+
+def test_a_kernel_broadcasts_over_leading_axes():
+    vectors = np.arange(24.0).reshape(2, 4, 3)
+    np.testing.assert_array_equal(divide(vectors, 2.0), vectors / 2.0)
+    np.testing.assert_array_equal(divide(vectors[0, 0], 2.0), vectors[0, 0] / 2.0)
+    assert divide(np.empty((0, 3)), 1.0).shape == (0, 3)
+
+
+def test_division_by_zero_yields_infinity_not_an_exception():
+    np.testing.assert_array_equal(divide(np.array([1.0, -1.0]), 0.0), [np.inf, -np.inf])
+
+
+def run(folder: Path, cache: Path) -> subprocess.CompletedProcess[str]:
+    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
+    environment |= {
+        "PYTHONPATH": os.pathsep.join([str(folder), PACKAGES]),
+        "NUMBA_CACHE_DIR": str(cache),
+        "HOME": str(cache),
+    }
+    return subprocess.run(
+        [sys.executable, "-c", "import user; print(user.twice(3.0))"],
+        env=environment, capture_output=True, text=True, check=True, timeout=100,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def program(tmp_path):
+    (tmp_path / "helper.py").write_text(
+        "from leg_kinematics.kernel import scalar\n\n@scalar\ndef times(x):\n    return 2.0 * x\n"
+    )
+    (tmp_path / "user.py").write_text(
+        textwrap.dedent("""
+        from leg_kinematics.kernel import kernel
+        from helper import times
+
+        @kernel("()->()", "f8, f8[:]")
+        def twice(x, result):
+            result[0] = times(x)
+        """)
+    )
+    return tmp_path
+
+
+def test_compiled_code_is_cached_and_an_edited_callee_invalidates_it(program, tmp_path):
+    cache = tmp_path / "cache"
+    cold, warm = run(program, cache), run(program, cache)
+    assert (cold.stdout, warm.stdout) == ("6.0\n", "6.0\n")
+    assert "compiling user.twice" in cold.stderr
+    assert "compiling" not in warm.stderr
+    helper = program / "helper.py"
+    helper.write_text(helper.read_text().replace("2.0", "5.0"))
+    edited = run(program, cache)
+    assert edited.stdout == "15.0\n"
+    assert "compiling user.twice" in edited.stderr
+
+
+def test_an_unwritable_cache_falls_back_to_none(program, tmp_path):
+    blocked = tmp_path / "file"  # a file where a folder is wanted: unwritable even for root
+    blocked.write_text("")
+    result = run(program, blocked)
+    assert result.stdout == "6.0\n"
+    assert "no writable cache folder" in result.stderr
