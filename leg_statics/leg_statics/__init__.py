@@ -1,0 +1,1 @@
+"""What a leg can carry: efforts, indices, load capacity, friction and step length."""

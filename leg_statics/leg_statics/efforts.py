@@ -1,0 +1,89 @@
+"""Actuator efforts that hold a foot against the ground: equations (5)-(7) of paper 000.
+
+The papers' F_C and M_C are what the foot exerts. Throughout the suite a wrench is what the ground
+applies to the foot (F_z > 0 for a standing leg); the sign changes here, and only here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.errors import ShapeError
+
+
+def joint_efforts(
+    jacobian: FloatArray,
+    angular_jacobian: FloatArray,
+    force: ArrayLike,
+    moment: ArrayLike = (0.0, 0.0, 0.0),
+) -> FloatArray:
+    """Efforts that hold a ground reaction: tau = -(J^T F + J_omega^T M), equation (6).
+
+    Hard ground transmits a force only; soft ground, in which the foot sinks, a moment as well.
+
+    Args:
+        jacobian: J of v = J q' (..., 3, n); rows after the third, the orientation of a
+            manipulator, are left to J_omega.
+        angular_jacobian: J_omega of omega = J_omega q' (..., 3, n).
+        force: Ground reaction on the foot (..., 3) [N].
+        moment: Moment of the ground on the foot (..., 3) [N.m].
+
+    Returns:
+        Joint efforts (..., n) [N.m, N for a prismatic joint].
+
+    Raises:
+        ShapeError: If shapes do not fit.
+    """
+    batch = np.shape(jacobian)[:-2]
+    f = as_matching("force", force, (3,), batch)
+    m = as_matching("moment", moment, (3,), batch)
+    return -(
+        np.einsum("...in,...i->...n", jacobian[..., :3, :], f)
+        + np.einsum("...in,...i->...n", angular_jacobian, m)
+    )
+
+
+def utilisation(
+    efforts: ArrayLike, effort_limits: ArrayLike
+) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Share of the effort limits that is used: 1 is at the limit of the worst joint.
+
+    Args:
+        efforts: Joint efforts (..., n) [N.m or N].
+        effort_limits: Lower (≤ 0) and upper (≥ 0) effort of each joint (..., n, 2).
+
+    Returns:
+        Largest ratio of effort to limit over the joints (...,), infinite for any effort of a joint
+        whose limit is zero, NaN where an effort is NaN; and the index of that joint (...,), -1
+        where no joint exerts anything or the efforts are NaN.
+
+    Raises:
+        ShapeError: If shapes do not fit.
+    """
+    tau = as_array("efforts", efforts)
+    if tau.ndim == 0:
+        raise ShapeError("efforts must have shape (..., n), got ()")
+    limits = as_matching("effort_limits", effort_limits, (tau.shape[-1], 2), tau.shape[:-1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(tau > 0.0, tau / limits[..., 1], tau / limits[..., 0])
+    ratio = np.where(tau == 0.0, 0.0, ratio)
+    worst = np.max(ratio, axis=-1)
+    joint = np.where(worst > 0.0, np.argmax(ratio, axis=-1), -1).astype(np.int32)
+    return worst, joint
+
+
+def worst_moment_efforts(angular_jacobian: FloatArray) -> FloatArray:
+    """Largest effort of each joint for a unit moment in the horizontal plane: equation (27).
+
+    The moment's direction is the one that is worst for the joint; a leg that swings about two axes
+    takes no moment about the vertical one (paper 000, after equation (7)).
+
+    Args:
+        angular_jacobian: J_omega of omega = J_omega q' (..., 3, n).
+
+    Returns:
+        Efforts (..., n), per unit moment.
+    """
+    return np.hypot(angular_jacobian[..., 0, :], angular_jacobian[..., 1, :])

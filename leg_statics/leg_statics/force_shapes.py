@@ -1,0 +1,56 @@
+"""Shapes of forces at a foot, for drawing: the friction cone and what the actuators can give."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, as_array
+
+# Corners of the box of joint efforts, as choices of lower (0) or upper (1), and its edges.
+CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+EDGES = tuple(
+    (a, b)
+    for a, b in itertools.combinations(range(len(CORNERS)), 2)
+    if np.sum(CORNERS[a] != CORNERS[b]) == 1
+)
+
+
+def force_polytope(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
+    """Corners of the set of ground reactions that the actuators can hold (8, 3) [N].
+
+    F = -J^-T tau maps the box of the efforts to a parallelepiped with the edges `EDGES`.
+
+    Args:
+        jacobian: Jacobian of the foot (3, 3).
+        effort_limits: Lower and upper effort of each actuator (3, 2) [N.m or N].
+
+    Returns:
+        NaN at a singularity, where the set is not bounded.
+    """
+    j = as_array("jacobian", jacobian, 3, 3)
+    limits = as_array("effort_limits", effort_limits, 3, 2)
+    efforts = np.take_along_axis(limits.T, CORNERS, axis=0)
+    if not np.isfinite(j).all() or np.linalg.cond(j) > 1e12:
+        return np.full((len(CORNERS), 3), np.nan)
+    corners: FloatArray = -np.linalg.solve(j.T, efforts.T).T
+    return corners
+
+
+def friction_cone(friction: float, normal: ArrayLike, points: int = 32) -> FloatArray:
+    """Forces on the rim of the friction cone with unit normal component, all around (points, 3).
+
+    Args:
+        friction: Friction coefficient of the ground.
+        normal: Normal of the ground (3,), of any length.
+        points: Number of points on the rim.
+    """
+    n = as_array("normal", normal, 3)
+    n = n / np.linalg.norm(n)
+    across = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    across /= np.linalg.norm(across)
+    angle = np.linspace(0.0, 2.0 * np.pi, points, endpoint=False)[:, None]
+    rim: FloatArray = n + friction * (np.cos(angle) * across + np.sin(angle) * np.cross(n, across))
+    return rim

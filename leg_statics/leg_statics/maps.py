@@ -1,0 +1,239 @@
+"""Index maps: every index of a leg over a plane of the workspace or over all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, StatusArray
+from leg_kinematics.errors import NotSupportedError, UnknownNameError, ValueRangeError
+from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.status import Status
+from leg_statics.footholds import Contact, evaluate_postures
+from leg_statics.global_means import actuator_grid
+from leg_statics.indices import evaluate_indices, find_index, supported_indices
+
+CAPACITY_LAYER = "load_capacity"
+MOST_POINTS = 20_000_000
+MOST_ALONG_AXIS = 1e9  # beyond, a number of points is not told exactly
+
+
+class IndexMap(NamedTuple):
+    """Values of several layers on a regular grid of the leg frame.
+
+    Attributes:
+        x: Grid coordinates along x (nx,) [m].
+        y: Grid coordinates along y (ny,) [m].
+        z: Grid coordinates along z (nz,) [m]; one for a plane.
+        layers: Names of the layers (K).
+        values: Values (nz, ny, nx, K); NaN outside the workspace.
+        status: `Status` of each point (nz, ny, nx).
+    """
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    layers: tuple[str, ...]
+    values: FloatArray
+    status: StatusArray
+
+    def layer(self, name: str) -> FloatArray:
+        """Return the values of one layer (nz, ny, nx)."""
+        if name not in self.layers:
+            raise UnknownNameError("layer", name, self.layers)
+        return self.values[..., self.layers.index(name)]
+
+
+def supported_layers(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the names of the layers that a map of this mechanism can have."""
+    return (*supported_indices(mechanism), CAPACITY_LAYER)
+
+
+def workspace_bounds(mechanism: Mechanism, points_per_joint: int = 15) -> FloatArray:
+    """Box in the leg frame that holds the workspace (3, 2) [m], with a margin of 2 %."""
+    posture = mechanism.forward(actuator_grid(mechanism, points_per_joint))
+    foot = posture.foot_position[posture.status == Status.OK]
+    if not len(foot):
+        raise ValueRangeError(f"mechanism {mechanism.name!r} reaches no point within its limits")
+    lower, upper = foot.min(axis=0), foot.max(axis=0)
+    margin = 0.02 * np.max(upper - lower) + 0.5 * (upper - lower) / points_per_joint
+    return np.stack([lower - margin, upper + margin], axis=-1)
+
+
+class Layer(NamedTuple):
+    """What a layer of a map is.
+
+    Attributes:
+        symbol: The literature's symbol.
+        unit: SI unit; "1" for a pure number.
+        better: Whether a low or a high value is better.
+    """
+
+    symbol: str
+    unit: str
+    better: Literal["low", "high"]
+
+
+def find_layer(name: str) -> Layer:
+    """Return what a layer is.
+
+    Raises:
+        UnknownNameError: If there is none of that name.
+    """
+    if name == CAPACITY_LAYER:
+        return Layer("F_n,max", "N", "high")
+    index = find_index(name)
+    return Layer(index.symbol, index.unit, index.better)
+
+
+def grid_shape(mechanism: Mechanism, resolution: float) -> tuple[int, int, int]:
+    """Return the number of points of a map along z, y and x.
+
+    Raises:
+        ValueRangeError: If the resolution is out of range.
+    """
+    first, last = _grid_range(mechanism, resolution)
+    nx, ny, nz = (int(n) for n in np.minimum(last - first + 1.0, MOST_ALONG_AXIS))
+    return nz, ny, nx
+
+
+def best_points(index_map: IndexMap) -> tuple[FloatArray, FloatArray]:
+    """Return the best value of each layer (K,) and where it is (K, 3) [m]; NaN if there is none."""
+    count = len(index_map.layers)
+    values = index_map.values.reshape(-1, count)
+    signs = [1.0 if find_layer(name).better == "low" else -1.0 for name in index_map.layers]
+    costs = np.where(np.isnan(values), np.inf, values * signs)
+    found = ~np.isnan(values).all(axis=0)
+    where = np.argmin(costs, axis=0)
+    z, y, x = np.unravel_index(where, index_map.status.shape)
+    positions = np.stack([index_map.x[x], index_map.y[y], index_map.z[z]], axis=-1)
+    best = values[where, np.arange(count)]
+    return np.where(found, best, np.nan), np.where(found[:, None], positions, np.nan)
+
+
+def plane_map(
+    mechanism: Mechanism,
+    height: float,
+    resolution: float,
+    *,
+    layers: Sequence[str] = (),
+    effort_limits: ArrayLike | None = None,
+    contact: Contact | None = None,
+) -> IndexMap:
+    """Map the layers over the plane z = height.
+
+    Args:
+        mechanism: The leg's mechanism.
+        height: z of the plane in the leg frame [m].
+        resolution: Grid spacing [m].
+        layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
+        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
+        contact: Ground for the layer "load_capacity".
+
+    Raises:
+        UnknownNameError: If a layer does not exist.
+        ValueRangeError: If height or resolution are out of range, or the map would be too large.
+    """
+    if not np.isfinite(height):
+        raise ValueRangeError(f"height must be finite, got {height}")
+    x, y, _ = _axes(mechanism, resolution)
+    names = _layers(mechanism, layers, effort_limits, contact)
+    values, status = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
+    return IndexMap(x, y, np.array([height]), names, values[None], status[None])
+
+
+def volume_map(
+    mechanism: Mechanism,
+    resolution: float,
+    *,
+    layers: Sequence[str] = (),
+    effort_limits: ArrayLike | None = None,
+    contact: Contact | None = None,
+) -> Iterator[IndexMap]:
+    """Map the layers over the whole workspace, one plane after the other.
+
+    Yields:
+        The map so far: all planes from the lowest, those not computed yet NaN and UNREACHABLE.
+        The arrays are the same each time and are filled in place.
+
+    Raises:
+        UnknownNameError: If a layer does not exist.
+        ValueRangeError: If the resolution is out of range, or the map would be too large.
+    """
+    x, y, z = _axes(mechanism, resolution)
+    names = _layers(mechanism, layers, effort_limits, contact)
+    shape = (len(z), len(y), len(x))
+    values = np.full((*shape, len(names)), np.nan)
+    status = np.full(shape, Status.UNREACHABLE, dtype=np.uint8)
+    result = IndexMap(x, y, z, names, values, status)
+    for k, height in enumerate(z):
+        values[k], status[k] = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
+        yield result
+
+
+def _axes(mechanism: Mechanism, resolution: float) -> list[FloatArray]:
+    """Return the grid coordinates of a box that holds the workspace; zero is one of them."""
+    first, last = _grid_range(mechanism, resolution)
+    if np.prod(last - first + 1.0) > MOST_POINTS:
+        raise ValueRangeError(
+            f"resolution {resolution} m makes {np.prod(last - first + 1.0):.0f} points; "
+            f"allowed are {MOST_POINTS}"
+        )
+    return [resolution * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True)]
+
+
+def _grid_range(mechanism: Mechanism, resolution: float) -> tuple[FloatArray, FloatArray]:
+    """Return the first and last multiple of the resolution along x, y and z."""
+    if not 0.0 < resolution < np.inf:
+        raise ValueRangeError(f"resolution must be > 0 m, got {resolution}")
+    bounds = workspace_bounds(mechanism)
+    return np.floor(bounds[:, 0] / resolution), np.ceil(bounds[:, 1] / resolution)
+
+
+def _layers(
+    mechanism: Mechanism,
+    layers: Sequence[str],
+    effort_limits: ArrayLike | None,
+    contact: Contact | None,
+) -> tuple[str, ...]:
+    """Return the layers asked for, or all that can be computed from what is given."""
+    if len(mechanism.task_coordinates) != 3:
+        raise NotSupportedError(
+            f"mechanism {mechanism.name!r} has {len(mechanism.task_coordinates)} task "
+            "coordinates: index maps need a point foot x, y, z"
+        )
+    with_capacity = effort_limits is not None and contact is not None
+    if not layers:
+        return supported_layers(mechanism) if with_capacity else supported_indices(mechanism)
+    for name in layers:
+        if name not in supported_layers(mechanism):
+            raise UnknownNameError("layer", name, supported_layers(mechanism))
+    if CAPACITY_LAYER in layers and not with_capacity:
+        raise ValueRangeError(f"layer {CAPACITY_LAYER!r} needs effort_limits and contact")
+    return tuple(layers)
+
+
+def _slice(
+    mechanism: Mechanism,
+    x: FloatArray,
+    y: FloatArray,
+    height: float,
+    names: tuple[str, ...],
+    effort_limits: ArrayLike | None,
+    contact: Contact | None,
+) -> tuple[FloatArray, StatusArray]:
+    """Return values (ny, nx, K) and status (ny, nx) of one plane."""
+    y_grid, x_grid = np.meshgrid(y, x, indexing="ij")
+    posture = mechanism.inverse(np.stack([x_grid, y_grid, np.full_like(x_grid, height)], axis=-1))
+    indices = [name for name in names if name != CAPACITY_LAYER]
+    values = np.full((*x_grid.shape, len(names)), np.nan)
+    if indices:
+        columns = [names.index(name) for name in indices]
+        values[..., columns] = evaluate_indices(mechanism, posture, indices)[1]
+    if CAPACITY_LAYER in names and effort_limits is not None and contact is not None:
+        footholds = evaluate_postures(mechanism, effort_limits, posture, contact)
+        values[..., names.index(CAPACITY_LAYER)] = footholds.load_capacity
+    return values, posture.status

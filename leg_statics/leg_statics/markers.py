@@ -1,0 +1,159 @@
+"""What RViz and Foxglove show of a leg: linkage, foot, forces, and a slice of its workspace."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from geometry_msgs.msg import Point, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.mechanism import Posture
+from leg_kinematics.robot import Leg
+from leg_kinematics.status import Status
+from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
+from leg_statics.maps import IndexMap
+
+BAR_WIDTH = 0.008  # m
+LINE_WIDTH = 0.003  # m
+FOOT_SIZE = 0.03  # m
+CONE_HEIGHT = 0.15  # m
+FORCE_SCALE = 1e-4  # m per N
+STEEL = (0.35, 0.38, 0.42, 1.0)
+RED = (0.85, 0.2, 0.15, 1.0)
+GREEN = (0.1, 0.6, 0.35, 0.6)
+BLUE = (0.15, 0.4, 0.85, 0.8)
+GREY = (0.5, 0.5, 0.5, 1.0)
+# Viridis at equal steps, from the lowest value to the highest.
+SCALE = np.array(
+    [
+        [0.267, 0.005, 0.329],
+        [0.230, 0.322, 0.546],
+        [0.128, 0.567, 0.551],
+        [0.369, 0.789, 0.383],
+        [0.993, 0.906, 0.144],
+    ]
+)
+
+
+class Scene(NamedTuple):
+    """What the markers of one leg show.
+
+    Attributes:
+        leg: The leg.
+        posture: Its posture.
+        friction: Friction coefficient of the ground.
+        force_scale: Length of a force [m/N].
+    """
+
+    leg: Leg
+    posture: Posture
+    friction: float
+    force_scale: float = FORCE_SCALE
+
+
+def moving_markers(header: Any, scene: Scene) -> list[Any]:
+    """Return what moves with a leg, in the robot's base frame.
+
+    What cannot be drawn in this posture is deleted.
+    """
+    mechanism, posture = scene.leg.mechanism, scene.posture
+    linkage = mechanism.linkage(posture)
+    ends = [pair for bar in linkage.bars for pair in itertools.pairwise(bar)]
+    foot = posture.foot_position[:3]
+    cone, polytope = np.empty((0, 3)), np.empty((0, 3))
+    if posture.status == Status.OK and mechanism.task_coordinates == ("x", "y", "z"):
+        cone = foot + _cone_lines(scene.friction)
+        jacobian = mechanism.jacobian(posture)
+        if jacobian.shape == (3, 3):
+            corners = force_polytope(jacobian, scene.leg.effort_limits)
+            polytope = foot + scene.force_scale * corners[np.ravel(EDGES)]
+    shapes = (
+        ("linkage", Marker.LINE_LIST, BAR_WIDTH, STEEL, linkage.points[np.ravel(ends).astype(int)]),
+        ("foot", Marker.SPHERE_LIST, FOOT_SIZE, RED, foot[None]),
+        ("friction_cone", Marker.LINE_LIST, LINE_WIDTH, GREEN, cone),
+        ("force_polytope", Marker.LINE_LIST, LINE_WIDTH, BLUE, polytope),
+    )
+    return [
+        _marker(header, f"{scene.leg.name}/{name}", kind, size, _points(scene.leg, points), color)
+        for name, kind, size, color, points in shapes
+    ]
+
+
+def workspace_marker(header: Any, leg: Leg, index_map: IndexMap, layer: str) -> Any:
+    """Return a plane of the workspace, coloured by a layer, in the robot's base frame.
+
+    Points where the layer is not defined are grey, those outside the workspace are left out.
+    """
+    inside = index_map.status == Status.OK
+    points = grid_points(index_map)[inside]
+    values = index_map.layer(layer)[inside]
+    resolution = float(index_map.x[1] - index_map.x[0]) if len(index_map.x) > 1 else 0.01
+    name = f"{leg.name}/workspace"
+    marker = _marker(header, name, Marker.CUBE_LIST, resolution, _points(leg, points), GREY)
+    marker.scale.z = 0.1 * resolution
+    marker.colors = [ColorRGBA(r=r, g=g, b=b, a=0.7) for r, g, b in colours(values).tolist()]
+    return marker
+
+
+def no_workspace_marker(header: Any, leg: Leg) -> Any:
+    """Return the marker that takes the workspace away."""
+    return _marker(header, f"{leg.name}/workspace", Marker.CUBE_LIST, 0.01, [], GREY)
+
+
+def grid_points(index_map: IndexMap) -> FloatArray:
+    """Return the grid points of a map (nz, ny, nx, 3) [m]."""
+    z, y, x = np.meshgrid(index_map.z, index_map.y, index_map.x, indexing="ij")
+    return np.stack([x, y, z], axis=-1)
+
+
+def colours(values: FloatArray) -> FloatArray:
+    """Return a colour (..., 3) for each value: viridis over the finite ones, grey for NaN."""
+    finite = values[np.isfinite(values)]
+    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
+    with np.errstate(invalid="ignore"):
+        share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)
+    steps = np.linspace(0.0, 1.0, len(SCALE))
+    result = np.stack([np.interp(share, steps, column) for column in SCALE.T], axis=-1)
+    return np.where(np.isnan(values)[..., None], GREY[:3], result)
+
+
+def _cone_lines(friction: float) -> FloatArray:
+    """Return the ends of the lines of a friction cone from its apex (2 per line, 3) [m]."""
+    rim = friction_cone(min(friction, 10.0), (0.0, 0.0, 1.0))
+    rim = CONE_HEIGHT * rim / max(1.0, float(np.linalg.norm(rim[0])) / 2.0)
+    rays = np.stack([np.zeros_like(rim[::4]), rim[::4]], axis=1)
+    circle = np.stack([rim, np.roll(rim, -1, axis=0)], axis=1)
+    return np.concatenate([rays, circle]).reshape(-1, 3)
+
+
+def _points(leg: Leg, points: FloatArray) -> list[Any]:
+    """Return points of the leg frame in the base frame; none if one is not finite."""
+    if not np.isfinite(points).all():
+        return []
+    return [Point(x=x, y=y, z=z) for x, y, z in leg.mount.to_base(points).tolist()]
+
+
+def _marker(
+    header: Any,
+    name: str,
+    kind: int,
+    size: float,
+    points: Sequence[Any],
+    color: tuple[float, float, float, float],
+) -> Any:
+    marker = Marker(
+        header=header,
+        ns=name,
+        type=kind,
+        action=Marker.ADD if points else Marker.DELETE,
+        scale=Vector3(x=size, y=size, z=size),
+        color=ColorRGBA(**dict(zip(("r", "g", "b", "a"), color, strict=True))),
+        points=list(points),
+    )
+    marker.pose.orientation.w = 1.0
+    return marker

@@ -1,0 +1,413 @@
+"""The statics node: what the legs of one robot can carry, asked by services and as a stream."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point, Pose, Quaternion
+from leg_msgs.msg import EffortLimits, LegDescription, LegState, LegStates
+from leg_msgs.srv import (
+    ComputeEfforts,
+    EvaluateIndices,
+    GetLegDescription,
+    QueryFootholds,
+    QueryStepLength,
+    SetEffortLimits,
+)
+from leg_msgs_py.arrays import from_field, to_field
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.errors import NotSupportedError, UnknownNameError
+from leg_kinematics.mechanism import SI_UNITS, Posture, geometry_parameters
+from leg_kinematics.requests import RequestError, check_count, find_frame, read_rows
+from leg_kinematics.robot import Leg, Robot
+from leg_kinematics.robot_node import LOG_PERIOD, RobotNode, run
+from leg_kinematics.status import Status
+from leg_statics.capacity import load_capacity
+from leg_statics.contacts import declare_grounds, read_bias, read_contact
+from leg_statics.efforts import joint_efforts, utilisation
+from leg_statics.footholds import Contact, evaluate_footholds
+from leg_statics.indices import INDICES, evaluate_indices, supported_indices
+from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
+from leg_statics.leg_state import leg_states
+from leg_statics.step_requests import fill_step_length
+
+AXES = ("x", "y", "z")
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KNOWN_LAYOUTS = 64  # kinds of joint state messages remembered
+
+
+class StaticsNode(RobotNode):
+    """Serves what a gait planner asks, and turns joint states into leg states."""
+
+    def __init__(self) -> None:
+        super().__init__("statics")
+        self.declare_number(
+            "friction_coefficient",
+            0.4,  # the low end of cement
+            "Friction coefficient of the ground for the load capacity in ~/leg_states.",
+            (0.0, 10.0),
+        )
+        self.declare_number(
+            "state_rate_limit", 0.0, "Greatest rate of ~/leg_states [Hz]; 0 = no limit.", (0.0, 1e4)
+        )
+        self.declare_number(
+            "max_steps",
+            1000,
+            "Steps (legs times heights) accepted in one request of a step length.",
+            (1, 100_000),
+        )
+        self._grounds = declare_grounds(self)
+        self._layouts: dict[tuple[str, ...], JointLayout] = {}
+        self._published_at: dict[tuple[str, ...], float] = {}
+        self._limits_publisher = self.create_publisher(EffortLimits, "~/effort_limits", LATCHED)
+        self._states_publisher = self.create_publisher(LegStates, "~/leg_states", 10)
+        self.serve(ComputeEfforts, "compute_efforts", self.compute_efforts)
+        self.serve(EvaluateIndices, "evaluate_indices", self.evaluate_indices)
+        self.serve(
+            GetLegDescription, "get_leg_description", self.get_leg_description, self._fill_legs
+        )
+        self.serve(QueryFootholds, "query_footholds", self.query_footholds)
+        self.serve(QueryStepLength, "query_step_length", self.query_step_length)
+        self.serve(SetEffortLimits, "set_effort_limits", self.set_effort_limits, self._fill_limits)
+        self.robot_changed()
+        self.create_subscription(
+            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
+        )
+        self.announce()
+
+    def warm_up(self, robot: Robot) -> None:
+        """Call the kernels of the statics once, too."""
+        super().warm_up(robot)
+        for leg in robot.legs.values():
+            posture = leg.mechanism.initial_posture
+            lower, upper = leg.effort_limits.T
+            evaluate_indices(leg.mechanism, posture)
+            if leg.mechanism.task_coordinates == AXES:
+                load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
+            if len(leg.mechanism.task_coordinates) == len(AXES):
+                feet = np.tile(posture.foot_position, (2, 1))
+                contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
+                evaluate_footholds(leg.mechanism, leg.effort_limits, feet, contact).ranking()
+
+    def robot_changed(self) -> None:
+        """Forget what was derived from the old description and publish the new limits."""
+        self._layouts.clear()
+        self._published_at.clear()
+        self.health.notes.clear()
+        self._publish_limits()
+
+    # ------------------------------------------------------------------ services
+
+    def compute_efforts(self, request: Any, response: Any) -> None:
+        """Fill the joint efforts that hold ground reactions."""
+        leg = self.robot.leg(request.leg)
+        if leg.mechanism.task_coordinates != AXES:
+            raise NotSupportedError(
+                f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
+                f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"
+            )
+        frame = find_frame(self.robot, leg, request.header.frame_id)
+        posture = self._posture(leg, request)
+        count = len(posture.status)
+        forces = frame.vectors_to_leg(_vectors("forces", request.forces, count))
+        moments = frame.vectors_to_leg(_vectors("moments", request.moments or [0.0] * 3, count))
+        mechanism = leg.mechanism
+        jacobian, angular_jacobian = (
+            mechanism.jacobian(posture),
+            mechanism.angular_jacobian(posture),
+        )
+        efforts = joint_efforts(jacobian, angular_jacobian, forces, moments)
+        status = posture.status.copy()
+        status[~np.isfinite(forces + moments).all(axis=-1)] = Status.INVALID_INPUT
+        efforts[status != Status.OK] = np.nan
+        used, limiting_joint = utilisation(efforts, leg.effort_limits)
+        response.joint_names = list(leg.joint_names)
+        response.joint_efforts = to_field(efforts)
+        response.utilisation = to_field(used)
+        response.limiting_joint = to_field(limiting_joint, np.int32)
+        response.status = to_field(status, np.uint8)
+
+    def evaluate_indices(self, request: Any, response: Any) -> None:
+        """Fill indices at foot positions."""
+        leg = self.robot.leg(request.leg)
+        posture = self._posture(leg, request)
+        names, values = evaluate_indices(leg.mechanism, posture, request.names)
+        response.names = list(names)
+        response.symbols = [INDICES[name].symbol for name in names]
+        response.units = [INDICES[name].unit for name in names]
+        response.values = to_field(values)
+        response.status = to_field(posture.status, np.uint8)
+
+    def query_footholds(self, request: Any, response: Any) -> None:
+        """Fill what the leg can carry at candidate footholds."""
+        leg = self.robot.leg(request.leg)
+        frame = find_frame(self.robot, leg, request.header.frame_id)
+        contact = read_contact(self._grounds, request, frame)
+        contact = contact._replace(bias=read_bias(leg, request.bias_efforts))
+        positions = read_rows("positions", request.positions, leg.mechanism.task_coordinates)
+        check_count("positions", len(positions), self.value("max_points"))
+        found = evaluate_footholds(
+            leg.mechanism, leg.effort_limits, frame.points_to_leg(positions), contact
+        )
+        ranking = found.ranking()
+        response.header = self.header(request.header.frame_id)
+        response.verdict = to_field(found.verdict, np.uint8)
+        response.status = to_field(found.posture.status, np.uint8)
+        response.load_capacity = to_field(found.load_capacity)
+        response.rated_friction = to_field(found.rated_friction)
+        response.rated_friction_full = to_field(found.rated_friction_full)
+        response.friction_margin = to_field(found.friction_margin)
+        response.utilisation = to_field(found.utilisation)
+        response.limiting_joint = to_field(found.limiting_joint, np.int32)
+        response.ranking = to_field(ranking, np.int32)
+        response.best = int(ranking[0]) if len(ranking) else -1
+        response.friction_coefficient = float(contact.friction)
+        if request.include_efforts:
+            response.joint_names = list(leg.joint_names)
+            response.joint_efforts = to_field(found.efforts)
+            response.forces = to_field(frame.vectors_from_leg(found.force))
+
+    def query_step_length(self, request: Any, response: Any) -> None:
+        """Fill the longest steps of legs, each and together."""
+        response.header = self.header(request.header.frame_id)
+        fill_step_length(self.robot, self._grounds, self.value("max_steps"), request, response)
+
+    def get_leg_description(self, request: Any, response: Any) -> None:
+        """Fill the description of a leg."""
+        response.description = description_message(self.robot, self.robot.leg(request.leg))
+
+    def set_effort_limits(self, request: Any, response: Any) -> None:
+        """Check new effort limits, then put all of them in force at once."""
+        leg = self.robot.leg(request.leg)
+        limits = leg.effort_limits.copy()
+        limits[_joint_rows(leg, request.joint_names)] = _new_limits(request)
+        legs = {**self.robot.legs, leg.name: replace(leg, effort_limits=limits)}
+        self.robot = replace(self.robot, legs=legs)
+        self._publish_limits()
+
+    def _fill_legs(self, response: Any) -> None:
+        response.legs = list(self.robot.legs)
+
+    def _fill_limits(self, response: Any) -> None:
+        response.limits = self._limits
+
+    def _posture(self, leg: Leg, request: Any) -> Posture:
+        """Return the postures at the foot positions of a request."""
+        frame = find_frame(self.robot, leg, request.header.frame_id)
+        coordinates = leg.mechanism.task_coordinates
+        positions = read_rows("positions", request.positions, coordinates)
+        check_count("positions", len(positions), self.value("max_points"))
+        return leg.mechanism.inverse(frame.points_to_leg(positions), request.assembly_mode)
+
+    def _publish_limits(self) -> None:
+        names, limits = self.robot.effort_limits()
+        self._limits = EffortLimits(
+            header=self.header(""),
+            joint_names=list(names),
+            lower=to_field(limits[:, 0]),
+            upper=to_field(limits[:, 1]),
+        )
+        self._limits_publisher.publish(self._limits)
+
+    # ------------------------------------------------------------------ stream
+
+    def joint_states(self, message: Any) -> None:
+        """Publish the states of all legs whose joints are in the message."""
+        self.health.received += 1
+        with self.health.timed():
+            try:
+                self._publish_states(message)
+            except Exception as error:
+                self._failure("joint_states", error)
+
+    def _publish_states(self, message: Any) -> None:
+        names = tuple(message.name)
+        layout = self._layout(names)
+        _check_joint_states(message, layout)
+        self._note_missing(layout)
+        if not layout.groups or self._too_soon(names):
+            return
+        states = {
+            leg: state for group in layout.groups for leg, state in self._states(group, message)
+        }
+        self._states_publisher.publish(
+            LegStates(
+                header=type(message.header)(
+                    stamp=message.header.stamp, frame_id=self.robot.base_frame
+                ),
+                legs=[states[leg] for leg in self.robot.legs if leg in states],
+            )
+        )
+
+    def _layout(self, names: tuple[str, ...]) -> JointLayout:
+        if names not in self._layouts:
+            if len(self._layouts) >= KNOWN_LAYOUTS:  # a stream whose names keep changing
+                self._layouts.clear()
+                self._published_at.clear()
+            self._layouts[names] = joint_layout(self.robot, names)
+        return self._layouts[names]
+
+    def _note_missing(self, layout: JointLayout) -> None:
+        for group in layout.groups:
+            for leg in group.legs:
+                self.health.notes.pop(f"leg not updated: {leg}", None)
+        for leg, joints in layout.missing.items():
+            text = f"{leg} is not updated: joint_states lack {', '.join(joints)}"
+            self.health.notes[f"leg not updated: {leg}"] = text
+            self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+
+    def _too_soon(self, names: tuple[str, ...]) -> bool:
+        """Tell whether the last states from such a message are too young for the rate limit."""
+        limit, now = self.value("state_rate_limit"), time.monotonic()
+        if limit > 0.0 and now - self._published_at.get(names, -np.inf) < 1.0 / limit:
+            return True
+        self._published_at[names] = now
+        return False
+
+    def _states(self, group: LegGroup, message: Any) -> list[tuple[str, LegState]]:
+        """Return the states of the legs of one mechanism, computed as one batch."""
+
+        def rows(values: Any) -> FloatArray:
+            return from_field(values)[group.columns]
+
+        positions = rows(message.position)
+        states = leg_states(
+            group.mechanism,
+            positions,
+            [self.robot.legs[leg].effort_limits for leg in group.legs],
+            self.value("friction_coefficient"),
+            rows(message.velocity) if message.velocity else None,
+            rows(message.effort) if message.effort else None,
+        )
+        return [
+            (
+                leg,
+                LegState(
+                    leg=leg,
+                    status=int(states.status[k]),
+                    joint_positions=to_field(positions[k]),
+                    foot_position=states.foot_position[k],
+                    foot_velocity=states.foot_velocity[k],
+                    condition_number=float(states.condition_number[k]),
+                    load_capacity=float(states.load_capacity[k]),
+                    rated_friction=float(states.rated_friction[k]),
+                    utilisation=float(states.utilisation[k]),
+                ),
+            )
+            for k, leg in enumerate(group.legs)
+        ]
+
+
+def _check_joint_states(message: Any, layout: JointLayout) -> None:
+    """Raise a RequestError if a message cannot be used."""
+    if layout.repeated:
+        raise RequestError(f"name: {', '.join(layout.repeated)} appear more than once")
+    count = len(message.name)
+    for field, may_be_empty in (("position", False), ("velocity", True), ("effort", True)):
+        length = len(getattr(message, field))
+        if length != count and not (length == 0 and may_be_empty):
+            allowed = f"{count} values, one a name" + (", or none" if may_be_empty else "")
+            raise RequestError(f"{field}: got {length} values; allowed: {allowed}")
+
+
+def _vectors(field: str, values: Any, count: int) -> FloatArray:
+    """Return one vector for each of `count` points, from one for all or one for each.
+
+    Raises:
+        RequestError: If there are neither 3 values nor 3 for each point.
+    """
+    if len(values) not in (3, 3 * count):
+        raise RequestError(
+            f"{field}: got {len(values)} values; allowed: 3 (one vector for all points) or "
+            f"{3 * count} (x, y, z of each of {count} points)"
+        )
+    return np.broadcast_to(read_rows(field, values, AXES), (count, 3))
+
+
+def _joint_rows(leg: Leg, names: Sequence[str]) -> list[int]:
+    """Return where joints stand in a leg.
+
+    Raises:
+        UnknownNameError: If the leg has no such joint.
+        RequestError: If a joint is named twice.
+    """
+    for name in names:
+        if name not in leg.joint_names:
+            raise UnknownNameError("joint", name, leg.joint_names)
+        if list(names).count(name) > 1:
+            raise RequestError(f"joint_names: {name!r} is given twice; allowed: once each")
+    return [leg.joint_names.index(name) for name in names]
+
+
+def _new_limits(request: Any) -> FloatArray:
+    """Return the limits of a request (joints, 2).
+
+    Raises:
+        RequestError: If their number or a value is wrong.
+    """
+    count = len(request.joint_names)
+    upper = from_field(request.upper)
+    lower = from_field(request.lower) if len(request.lower) else -upper
+    for field, values in (("upper", upper), ("lower", lower)):
+        if len(values) != count:
+            raise RequestError(f"{field}: got {len(values)} values; allowed: {count}, one a joint")
+    for name, least, greatest in zip(request.joint_names, lower, upper, strict=True):
+        if not (np.isfinite(greatest) and greatest >= 0.0):
+            raise RequestError(f"upper of {name}: got {greatest}; allowed: finite and >= 0")
+        if not (np.isfinite(least) and least <= 0.0):
+            raise RequestError(f"lower of {name}: got {least}; allowed: finite and <= 0")
+    return np.stack([lower, upper], axis=-1)
+
+
+def description_message(robot: Robot, leg: Leg) -> Any:
+    """Return a leg as a `leg_msgs/LegDescription`."""
+    mechanism = leg.mechanism
+    x, y, z = map(float, leg.mount.position)
+    turn = map(float, Rotation.from_matrix(leg.mount.rotation).as_quat())
+    parameters = geometry_parameters(leg.geometry)
+    return LegDescription(
+        robot=robot.name,
+        leg=leg.name,
+        leg_type=leg.leg_type,
+        mechanism=mechanism.name,
+        base_frame=robot.base_frame,
+        leg_frame=leg.frame,
+        mount=Pose(
+            position=Point(x=x, y=y, z=z),
+            orientation=Quaternion(**dict(zip(("x", "y", "z", "w"), turn, strict=True))),
+        ),
+        mirrored=leg.mirrored,
+        joint_names=list(leg.joint_names),
+        joint_types=[joint.type for joint in mechanism.joints],
+        joint_position_units=[joint.unit for joint in mechanism.joints],
+        joint_position_lower=to_field(mechanism.joint_limits[:, 0]),
+        joint_position_upper=to_field(mechanism.joint_limits[:, 1]),
+        joint_effort_units=[joint.effort_unit for joint in mechanism.joints],
+        joint_effort_lower=to_field(leg.effort_limits[:, 0]),
+        joint_effort_upper=to_field(leg.effort_limits[:, 1]),
+        passive_joint_names=[joint.name for joint in mechanism.passive_joints],
+        passive_joint_lower=to_field(mechanism.passive_joint_limits[:, 0]),
+        passive_joint_upper=to_field(mechanism.passive_joint_limits[:, 1]),
+        task_coordinates=list(mechanism.task_coordinates),
+        task_units=list(mechanism.task_units),
+        assembly_modes=list(mechanism.assembly_modes),
+        initial_foot_position=mechanism.initial_posture.foot_position[..., :3],
+        geometry_names=[f.name for f in parameters],
+        geometry_symbols=[f.metadata["symbol"] for f in parameters],
+        geometry_values=to_field([getattr(leg.geometry, f.name) for f in parameters]),
+        geometry_units=[SI_UNITS[f.metadata["dimension"]] for f in parameters],
+        index_names=list(supported_indices(mechanism)),
+    )
+
+
+def main() -> int:
+    """Run the node."""
+    return run(StaticsNode)

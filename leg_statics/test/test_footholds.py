@@ -1,0 +1,246 @@
+"""Footholds: verdicts, forces and shares, checked by other optimisers and by admissibility."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.optimize import linprog
+
+from leg_kinematics import ParallelDrive, ShapeError, Status, ValueRangeError
+from leg_kinematics.mirrored import Mirrored
+from leg_statics.capacity import load_capacity
+from leg_statics.efforts import joint_efforts
+from leg_statics.footholds import Contact, Verdict, evaluate_footholds
+from leg_statics.published.paper_000 import legs
+
+LEG = legs()["optimised"]
+LIMITS = np.array([[-60.0, 60.0], [-60.0, 60.0], [-80.0, 40.0]])
+CANDIDATES = np.random.default_rng(0).uniform([-0.3, -0.4, -0.8], [0.3, 0.3, -0.4], (4000, 3))
+NORMAL = np.array([0.1, -0.2, 1.0])
+BIAS = np.array([4.0, -3.0, 6.0])
+MOMENT = np.array([3.0, -2.0, 1.0])
+CONTACTS = {
+    "level": Contact(0.4, load=150.0),
+    "inclined": Contact(0.6, normal=NORMAL, load=150.0),
+    "smooth": Contact(0.05, load=150.0),
+    "soft": Contact(0.5, load=150.0, moment=MOMENT),
+    "any moment": Contact(0.5, load=150.0, any_moment=4.0),
+    "weighted": Contact(0.5, load=150.0, bias=BIAS),
+    "heavy": Contact(0.4, load=400.0),
+}
+every_contact = pytest.mark.parametrize("contact", CONTACTS.values(), ids=CONTACTS)
+
+
+@every_contact
+def test_a_candidate_that_is_not_solved_tells_why(contact):
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    unsolved = footholds.posture.status != Status.OK
+    assert 0.1 < unsolved.mean() < 0.9
+    np.testing.assert_array_equal(footholds.verdict[unsolved], footholds.posture.status[unsolved])
+    assert not footholds.feasible[unsolved].any()
+    for values in (footholds.load_capacity, footholds.rated_friction, footholds.utilisation):
+        assert np.isnan(values[unsolved]).all()
+    assert (footholds.limiting_joint[unsolved] == -1).all()
+
+
+@every_contact
+def test_the_force_of_a_feasible_candidate_is_admissible(contact):
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    good = footholds.feasible
+    assert good.sum() > 20
+    force, posture = footholds.force[good], footholds.posture
+    normal = np.asarray(contact.normal) / np.linalg.norm(contact.normal)
+    pressed = force @ normal
+    np.testing.assert_allclose(pressed, contact.load, rtol=1e-9)
+    sideways = np.linalg.norm(force - pressed[:, None] * normal, axis=1)
+    assert np.all(sideways <= contact.friction * pressed * (1 + 1e-9))
+    expected = joint_efforts(
+        LEG.jacobian(posture)[good], LEG.angular_jacobian(posture)[good], force, contact.moment
+    ) + np.asarray(contact.bias)
+    efforts = footholds.efforts[good]
+    np.testing.assert_allclose(efforts, expected, rtol=1e-9, atol=1e-9)
+    j_omega = LEG.angular_jacobian(posture)[good]
+    reserve = contact.any_moment * np.hypot(j_omega[:, 0], j_omega[:, 1])
+    share = np.maximum((efforts + reserve) / LIMITS[:, 1], (efforts - reserve) / LIMITS[:, 0])
+    np.testing.assert_allclose(footholds.utilisation[good], share.max(axis=1), rtol=1e-9)
+    np.testing.assert_array_equal(footholds.limiting_joint[good], share.argmax(axis=1))
+    assert np.all(share <= 1.0 + 1e-9)
+
+
+@every_contact
+def test_a_verdict_of_friction_or_effort_is_confirmed_by_a_linear_programme(contact):
+    """Without the cone the question is linear: highs must find the load, or not, likewise."""
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    normal = np.asarray(contact.normal) / np.linalg.norm(contact.normal)
+    posture = footholds.posture
+    jacobian, j_omega = LEG.jacobian(posture), LEG.angular_jacobian(posture)
+    for verdict in (Verdict.FRICTION, Verdict.EFFORT):
+        for k in np.flatnonzero(footholds.verdict == verdict)[:40]:
+            idle = joint_efforts(0 * jacobian[k], j_omega[k], np.zeros(3), contact.moment)
+            idle = idle + np.asarray(contact.bias)
+            reserve = contact.any_moment * np.hypot(j_omega[k, 0], j_omega[k, 1])
+            lower, upper = LIMITS[:, 0] + reserve, LIMITS[:, 1] - reserve
+            result = linprog(
+                -normal,
+                A_ub=np.vstack([jacobian[k].T, -jacobian[k].T]),
+                b_ub=np.concatenate([idle - lower, upper - idle]),
+                bounds=[(None, None)] * 3,
+                method="highs",
+            )
+            rough = np.inf if result.status == 3 else -result.fun
+            assert (rough >= contact.load) == (verdict == Verdict.FRICTION)
+
+
+def test_each_verdict_occurs():
+    seen = {
+        int(v)
+        for contact in CONTACTS.values()
+        for v in evaluate_footholds(LEG, LIMITS, CANDIDATES, contact).verdict
+    }
+    seen.add(int(evaluate_footholds(LEG, LIMITS, [np.nan, 0.0, -0.6], CONTACTS["level"]).verdict))
+    assert seen == set(map(int, Verdict))
+
+
+def test_capacity_is_that_of_the_jacobian():
+    contact = Contact(0.4, normal=NORMAL, load=10.0, bias=BIAS)
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    ok = footholds.posture.status == Status.OK
+    direct = load_capacity(
+        LEG.jacobian(footholds.posture), *LIMITS.T, 0.4, normal=NORMAL, bias=BIAS
+    )
+    np.testing.assert_allclose(footholds.load_capacity[ok], direct.capacity[ok], rtol=1e-12)
+
+
+def test_a_moment_of_unknown_direction_costs_at_least_as_much_as_any_known_one():
+    size = 5.0
+    worst = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, any_moment=size))
+    ok = worst.posture.status == Status.OK
+    for angle in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
+        moment = size * np.array([np.cos(angle), np.sin(angle), 0.0])
+        known = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, moment=moment))
+        assert np.all(known.load_capacity[ok] >= worst.load_capacity[ok] * (1 - 1e-9))
+    hard = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4))
+    assert np.all(hard.load_capacity[ok] >= worst.load_capacity[ok])
+
+
+def test_a_leg_that_cannot_be_held_carries_nothing():
+    for contact in (
+        Contact(0.4, bias=(0.0, -61.0, 0.0)),
+        Contact(0.4, any_moment=1e6),
+        Contact(0.4, moment=(1e6, 0.0, 0.0)),
+    ):
+        footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+        ok = footholds.posture.status == Status.OK
+        assert np.all(footholds.verdict[ok] == Verdict.EFFORT)
+        assert np.all(footholds.load_capacity[ok] == 0.0)
+        assert np.all(footholds.utilisation[ok] > 1.0)
+
+
+def test_ranking_lists_feasible_candidates_by_capacity():
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"])
+    order = footholds.ranking()
+    assert len(order) == footholds.feasible.sum()
+    assert footholds.feasible[order].all()
+    assert np.all(np.diff(footholds.load_capacity[order]) <= 0.0)
+    best = int(np.nanargmax(np.where(footholds.feasible, footholds.load_capacity, np.nan)))
+    assert order[0] == best
+
+
+def test_no_load_is_feasible_wherever_the_posture_is_ok():
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.0, load=0.0))
+    ok = footholds.posture.status == Status.OK
+    assert footholds.feasible[ok].all()
+    np.testing.assert_array_equal(footholds.force[ok], 0.0)
+    np.testing.assert_array_equal(footholds.utilisation[ok], 0.0)
+
+
+def test_friction_margin_is_what_the_ground_offers_beyond_mu_e():
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4))
+    ok = footholds.posture.status == Status.OK
+    np.testing.assert_allclose(
+        footholds.friction_margin[ok], 0.4 - footholds.rated_friction[ok], atol=1e-12
+    )
+    assert np.all(footholds.rated_friction_full[ok] >= footholds.rated_friction[ok])
+
+
+def test_a_mirrored_leg_mirrors_everything():
+    contact = CONTACTS["inclined"]
+    mirror = contact._replace(normal=NORMAL * [-1, 1, 1])
+    a = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    b = evaluate_footholds(Mirrored(LEG), LIMITS, CANDIDATES * [-1, 1, 1], mirror)
+    np.testing.assert_array_equal(a.verdict, b.verdict)
+    np.testing.assert_allclose(a.load_capacity, b.load_capacity, rtol=1e-9)
+    np.testing.assert_allclose(a.force * [-1, 1, 1], b.force, rtol=1e-6, atol=1e-6)
+
+
+def test_contacts_may_differ_from_candidate_to_candidate():
+    friction = np.linspace(0.05, 1.0, 50)
+    load = np.linspace(400.0, 10.0, 50)
+    together = evaluate_footholds(
+        LEG, LIMITS, CANDIDATES[:50], Contact(friction, load=load, moment=np.tile(MOMENT, (50, 1)))
+    )
+    for k in range(50):
+        one = evaluate_footholds(
+            LEG, LIMITS, CANDIDATES[k], Contact(friction[k], load=load[k], moment=MOMENT)
+        )
+        assert one.verdict == together.verdict[k]
+        np.testing.assert_array_equal(one.load_capacity, together.load_capacity[k])
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"friction": -0.1}, "friction"),
+        ({"friction": np.nan}, "friction"),
+        ({"load": -1.0}, "load"),
+        ({"load": np.nan}, "load"),
+        ({"load": np.inf}, "load"),
+        ({"any_moment": -1.0}, "any_moment"),
+        ({"any_moment": np.inf}, "any_moment"),
+        ({"moment": (0.0, np.nan, 0.0)}, "moment"),
+        ({"normal": (0.0, 0.0, 0.0)}, "normal"),
+        ({"normal": (0.0, np.nan, 1.0)}, "normal"),
+        ({"bias": (0.0, np.inf, 0.0)}, "bias"),
+    ],
+)
+def test_a_value_out_of_range_is_named(change, named):
+    with pytest.raises(ValueRangeError, match=named):
+        evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"]._replace(**change))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"friction": [0.1, 0.2]}, "friction"),
+        ({"moment": (0.0, 1.0)}, "moment"),
+        ({"normal": (0.0, 1.0)}, "normal"),
+        ({"bias": (0.0, 1.0)}, "bias"),
+        ({"load": "heavy"}, "load"),
+    ],
+)
+def test_a_wrong_shape_is_named(change, named):
+    with pytest.raises(ShapeError, match=named):
+        evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"]._replace(**change))
+    with pytest.raises(ShapeError, match="foot_positions"):
+        evaluate_footholds(LEG, LIMITS, [[0.0, 1.0]], CONTACTS["level"])
+    with pytest.raises(ShapeError, match="effort_limits"):
+        evaluate_footholds(LEG, LIMITS[:2], CANDIDATES, CONTACTS["level"])
+
+
+def test_no_candidates_give_no_answers():
+    footholds = evaluate_footholds(LEG, LIMITS, np.empty((0, 3)), CONTACTS["level"])
+    assert footholds.verdict.shape == (0,)
+    assert footholds.ranking().shape == (0,)
+
+
+@settings(max_examples=200, deadline=None)
+@given(hnp.arrays(np.float64, (6, 3), elements=st.floats()), st.floats(0.0, 10.0))
+def test_any_candidates_are_taken(points, friction):
+    footholds = evaluate_footholds(ParallelDrive(), LIMITS, points, Contact(friction, load=100.0))
+    good = footholds.feasible
+    for values in (footholds.load_capacity, footholds.utilisation, footholds.rated_friction):
+        assert np.isfinite(values[good]).all()
+    assert np.all(footholds.verdict[~np.isfinite(points).all(axis=1)] == Verdict.INVALID_INPUT)
