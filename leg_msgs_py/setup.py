@@ -1,0 +1,20 @@
+from setuptools import find_packages, setup
+
+package_name = "leg_msgs_py"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + package_name]),
+        ("share/" + package_name, ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Leg Capacity Developers",
+    maintainer_email="maintainers@example.org",
+    description="Conversions between numpy arrays and leg_msgs, and a client for gait planners.",
+    license="Apache-2.0",
+    extras_require={"test": ["pytest"]},
+)
