@@ -1,0 +1,46 @@
+# Every target sets the workspace up first, from nothing if need be; `make help` lists them.
+
+VENV := $(CURDIR)/.venv
+VENV_PYTHON := $(VENV)/bin/python
+# The Python to make .venv with. Once it is there it stays with its Python, unless PYTHON names another.
+PYTHON ?= $(or $(wildcard $(VENV_PYTHON)),python3)
+
+# Nodes talk on this machine only, and no ROS that the shell has sourced shows through.
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export AMENT_PREFIX_PATH := $(VENV)
+unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo run test lint typecheck bench papers clean
+
+help:  ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: setup  ## Show what the suite answers, on the example robots
+	$(VENV_PYTHON) tools/demo.py
+
+run: setup  ## Start the nodes of one robot
+	$(VENV_PYTHON) tools/run_robot.py
+
+test: lint typecheck  ## Check style and types, then run every test
+	$(VENV_PYTHON) -m pytest
+
+lint: setup  ## Check style and format
+	$(VENV_PYTHON) -m ruff check
+	$(VENV_PYTHON) -m ruff format --check
+
+typecheck: setup  ## Check types
+	$(VENV_PYTHON) -m mypy
+
+bench: setup  ## Measure speed through the public interfaces
+	$(VENV_PYTHON) benchmarks/run.py
+
+papers: setup  ## Recompute the published tables and show them side by side
+	$(VENV_PYTHON) tools/papers.py
+
+clean:  ## Remove the environment and all caches
+	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+setup:
+	@$(PYTHON) tools/setup_workspace.py

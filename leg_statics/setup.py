@@ -1,0 +1,29 @@
+from setuptools import find_packages, setup
+
+package_name = "leg_statics"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + package_name]),
+        ("share/" + package_name, ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Leg Capacity Developers",
+    maintainer_email="maintainers@example.org",
+    description="What a leg can carry, and the node that serves it.",
+    license="Apache-2.0",
+    extras_require={"test": ["pytest"]},
+    entry_points={
+        "console_scripts": [
+            "plot_gantry_example = leg_statics.plot_gantry_example:main",
+            "maps_node = leg_statics.maps_node:main",
+            "plot_index_map = leg_statics.plot_index_map:main",
+            "synthesize_six_bar = leg_statics.synthesize_six_bar:main",
+            "statics_node = leg_statics.statics_node:main",
+        ],
+    },
+)
