@@ -11,10 +11,10 @@ export AMENT_PREFIX_PATH := $(VENV)
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint typecheck bench papers clean
+.PHONY: help setup demo run test lint typecheck bench bench-compare papers clean
 
 help:  ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: setup  ## Show what the suite answers, on the example robots
 	$(VENV_PYTHON) tools/demo.py
@@ -32,8 +32,14 @@ lint: setup  ## Check style and format
 typecheck: setup  ## Check types
 	$(VENV_PYTHON) -m mypy
 
-bench: setup  ## Measure speed through the public interfaces
-	$(VENV_PYTHON) benchmarks/run.py
+bench: setup  ## Measure speed through the public interfaces, and that of other software
+	@echo "Installing what to compare with, unless it is there ..."
+	@$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile --no-deps \
+		--require-hashes --requirement benchmarks/requirements.txt
+	$(VENV_PYTHON) benchmarks/run.py $(BENCH)
+
+bench-compare: setup  ## Show what changed since the saved baseline
+	$(VENV_PYTHON) benchmarks/compare.py
 
 papers: setup  ## Recompute the published tables and show them side by side
 	$(VENV_PYTHON) tools/papers.py

@@ -115,7 +115,7 @@ def test_each_node_package_installs_its_node():
         for package in PYTHON_PACKAGES
         for entry_point in importlib.metadata.distribution(package).entry_points
     }
-    assert {"kinematics_node", "statics_node"} <= installed
+    assert {"kinematics_node", "maps_node", "statics_node"} <= installed
 
 
 @pytest.mark.parametrize("path", INTERFACES, ids=interface_id)

@@ -74,8 +74,10 @@ def _condition_number(matrix, result):
         1.0 / zz,
     )
     product = triangular_norm(xx, yx, yy, zx, zy, zz) * inverse_norm
-    finite = math.isfinite(matrix.sum())
-    result[0] = math.inf if finite and not math.isfinite(product) else product
+    result[0] = product if math.isfinite(product) else math.inf
+    for value in matrix.flat:
+        if not math.isfinite(value):
+            result[0] = math.nan
 
 
 def condition_number(jacobian: ArrayLike) -> FloatArray:

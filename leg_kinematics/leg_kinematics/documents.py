@@ -102,7 +102,8 @@ class Document:
         part: Any = self.root
         for key in where:
             try:
-                position = part.lc.value(key) if isinstance(part, Mapping) else part.lc.item(key)
+                place = part.lc  # of ruamel.yaml: line and column of keys and items
+                position = place.value(key) if isinstance(part, Mapping) else place.item(key)
                 line, part = position[0] + 1, part[key]
             except (AttributeError, KeyError, IndexError, TypeError):
                 break

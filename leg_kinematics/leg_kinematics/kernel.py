@@ -20,6 +20,8 @@ only edits of the file in which the kernel stands.
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import hashlib
 import inspect
 import math
@@ -40,7 +42,7 @@ from numba.core.dispatcher import Dispatcher
 # numpy's error model: a division by zero yields inf or NaN for that point, never an exception.
 scalar = numba.njit(error_model="numpy")
 
-_compile_lock = threading.RLock()
+_thread_lock = threading.RLock()
 
 
 class Kernel:
@@ -60,8 +62,8 @@ class Kernel:
     @cached_property
     def gufunc(self) -> Any:
         """The compiled generalized ufunc."""
-        with _compile_lock:
-            folder = _cache_folder(self.function)
+        folder = _cache_folder(self.function)
+        with _thread_lock, _process_lock(folder):
             name = f"{self.function.__module__}.{self.function.__qualname__}"
             if folder is None or not any(folder.rglob(f"*.{self.function.__name__}-*.nbi")):
                 print(f"compiling {name} for this machine (once)", file=sys.stderr, flush=True)
@@ -101,9 +103,25 @@ def _cache_folder(function: Callable[..., None]) -> Path | None:
     return None
 
 
+@contextlib.contextmanager
+def _process_lock(folder: Path | None) -> Iterator[None]:
+    """Let one process at a time compile into a folder; the others then load what it compiled.
+
+    Without it, nodes that start together write over each other's files, and numba loads machine
+    code under an index that belongs to another compilation.
+    """
+    if folder is None:
+        yield
+        return
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # closing the file gives it back
+        yield
+
+
 def _digest(function: Callable[..., None]) -> str:
     """Return a digest of the sources of `function` and of all scalar code it calls."""
-    parts = [numba.__version__, *sorted(set(_sources(function, set())))]
+    versions = [numba.__version__, str(sys.implementation.cache_tag)]
+    parts = [*versions, *sorted(set(_sources(function, set())))]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 

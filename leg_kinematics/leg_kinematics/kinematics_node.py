@@ -9,7 +9,6 @@ from leg_msgs.srv import ForwardKinematics, GetJacobian, InverseKinematics
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.conditioning import condition_number
-from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Posture
 from leg_kinematics.requests import RequestError, check_count, find_frame, read_rows
 from leg_kinematics.robot import Leg

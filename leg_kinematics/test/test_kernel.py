@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,13 @@ def test_compiled_code_is_cached_and_an_edited_callee_invalidates_it(program, tm
     edited = run(program, cache)
     assert edited.stdout == "15.0\n"
     assert "compiling user.twice" in edited.stderr
+
+
+def test_processes_that_start_together_compile_once_and_all_answer(program, tmp_path):
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(lambda _: run(program, tmp_path / "cache"), range(4)))
+    assert [result.stdout for result in results] == ["6.0\n"] * 4
+    assert sum("compiling user.twice" in result.stderr for result in results) == 1
 
 
 def test_an_unwritable_cache_falls_back_to_none(program, tmp_path):

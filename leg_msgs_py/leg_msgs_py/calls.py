@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 import rclpy
 from leg_msgs.msg import ErrorCode
 from leg_msgs_py.errors import CancelledError, ServerUnavailableError, TimedOutError, check
+from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -112,7 +113,7 @@ class _Call:
                 message = f"{self.client.srv_name} gave no answer within {timeout:g} s"
                 error = TimedOutError(message)
             else:
-                error = _unavailable(self.client, timeout)
+                error = server_unavailable(self.client.srv_name, timeout)
             self.forget()
             self.future.settle(error=error)
             return True
@@ -123,10 +124,10 @@ class _Call:
         return False
 
 
-def _unavailable(client: Any, timeout: float) -> ServerUnavailableError:
+def server_unavailable(name: str, timeout: float) -> ServerUnavailableError:
+    """Return the error for a server that was not there in time."""
     return ServerUnavailableError(
-        f"no node serves {client.srv_name}, waited {timeout:g} s; does it run, with the same "
-        "ROS_DOMAIN_ID?"
+        f"no node serves {name}, waited {timeout:g} s; does it run, with the same ROS_DOMAIN_ID?"
     )
 
 
@@ -148,8 +149,9 @@ class Caller:
         self.node: Node = self._background.node if self._background else node
         self._group = ReentrantCallbackGroup()
         self._clients: dict[str, Any] = {}
+        self._actions: dict[str, Any] = {}
         self._topics: dict[str, _LatchedTopic] = {}
-        self._calls: set[_Call] = set()
+        self._calls: set[Any] = set()
         self._lock = threading.RLock()
         self._waiting = threading.Event()
         self._closed = False
@@ -167,6 +169,16 @@ class Caller:
                 )
             return self._clients[service]
 
+    def action_client(self, action: str, action_type: Any) -> Any:
+        """Return the rclpy client of an action, made at its first use."""
+        with self._lock:
+            self._check_open()
+            if action not in self._actions:
+                self._actions[action] = ActionClient(
+                    self.node, action_type, action, callback_group=self._group
+                )
+            return self._actions[action]
+
     def wait_for_servers(self, services: Iterable[tuple[str, Any]], timeout: float) -> None:
         """Wait until every service is there.
 
@@ -181,7 +193,7 @@ class Caller:
         for client in [self.client(*service) for service in services]:
             while not client.service_is_ready():
                 if time.monotonic() > deadline:
-                    raise _unavailable(client, timeout)
+                    raise server_unavailable(client.srv_name, timeout)
                 time.sleep(WATCH_PERIOD)
 
     def call(
@@ -206,7 +218,7 @@ class Caller:
             check_error(response.error)
             return decode(response)
 
-        future: CallFuture[T] = CallFuture(None if self._background else self.node.executor)
+        future: CallFuture[T] = CallFuture(self.future_executor)
         deadline = time.monotonic() + self.timeout
         call = _Call(self.client(service, service_type), request, checked, future, deadline)
         with self._lock:
@@ -215,6 +227,19 @@ class Caller:
             self._calls.add(call)
         self._waiting.set()
         return future
+
+    @property
+    def future_executor(self) -> Any:
+        """The executor in which a future may be awaited; None for a node of its own."""
+        return None if self._background else self.node.executor
+
+    def look_after(self, call: Any) -> None:
+        """Advance a call until it is over, one of another kind than `call` makes."""
+        with self._lock:
+            self._check_open()
+            call.advance(self.timeout, self._may_send)
+            self._calls.add(call)
+        self._waiting.set()
 
     def latest(self, topic: str, message_type: Any) -> Any:
         """Return the last message of a latched topic, waiting for the first one.
@@ -249,6 +274,8 @@ class Caller:
             return
         for client in self._clients.values():
             self.node.destroy_client(client)
+        for action in self._actions.values():
+            action.destroy()
         for topic in self._topics.values():
             self.node.destroy_subscription(topic.subscription)
 
@@ -273,7 +300,7 @@ class Caller:
                 if not self._calls and not self._closed:
                     self._waiting.clear()
 
-    def _is_over(self, call: _Call) -> bool:
+    def _is_over(self, call: Any) -> bool:
         try:
             with self._lock:
                 return call.advance(self.timeout, self._may_send)

@@ -19,28 +19,40 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from leg_msgs.action import ComputeIndexMap
 from leg_msgs.msg import EffortLimits as EffortLimitsMessage
 from leg_msgs.srv import (
     ComputeEfforts,
     EvaluateIndices,
     ForwardKinematics,
+    GetIndexMap,
     GetJacobian,
     GetLegDescription,
     InverseKinematics,
+    QueryFootholds,
+    QueryStepLength,
     SetEffortLimits,
 )
 from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.calls import Caller, CallFuture
-from leg_msgs_py.errors import InvalidInputError
+from leg_msgs_py.clouds import from_cloud
+from leg_msgs_py.errors import InvalidInputError, TooLargeError
+from leg_msgs_py.goals import GoalFuture, send_goal
+from leg_msgs_py.grounds import Ground, ground_message
 from leg_msgs_py.results import (
     EffortLimits,
     Efforts,
     FloatArray,
+    Footholds,
     FootPositions,
+    IndexCloud,
+    IndexMap,
     Indices,
     Jacobians,
     JointPositions,
     LegDescription,
+    MapProgress,
+    StepLengths,
 )
 from numpy.typing import ArrayLike
 from rclpy.node import Node
@@ -55,13 +67,18 @@ SERVICES = {
         "compute_efforts": ComputeEfforts,
         "evaluate_indices": EvaluateIndices,
         "get_leg_description": GetLegDescription,
+        "query_footholds": QueryFootholds,
+        "query_step_length": QueryStepLength,
         "set_effort_limits": SetEffortLimits,
+    },
+    "maps": {
+        "get_index_map": GetIndexMap,
     },
 }
 
 
 class LegClient:
-    """Asks the kinematics and statics nodes of one robot.
+    """Asks the kinematics, statics and maps nodes of one robot.
 
     Every call takes points of any leading axes (..., t) and gives arrays with the same leading
     axes. Calls raise a `LegServiceError` of `leg_msgs_py.errors`: `UnknownLegError`,
@@ -73,6 +90,8 @@ class LegClient:
         namespace: Namespace of the robot's nodes, such as "robot_1"; "" for none.
         timeout: Time allowed for each call, including the wait for the server [s].
         domain_id: ROS domain if the node is its own; None for that of the environment.
+        max_points: Points accepted in one call, as the nodes' parameter of this name: more are
+            refused here, before they are sent.
     """
 
     def __init__(
@@ -82,13 +101,16 @@ class LegClient:
         namespace: str = "",
         timeout: float = 5.0,
         domain_id: int | None = None,
+        max_points: int = 1_000_000,
     ) -> None:
+        self._max_points = max_points
         prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
         self._services = {
             service: (f"{prefix}/{server}/{service}", service_type)
             for server, services in SERVICES.items()
             for service, service_type in services.items()
         }
+        self._map_action = (f"{prefix}/maps/compute_index_map", ComputeIndexMap)
         self._effort_limits_topic = f"{prefix}/statics/effort_limits"
         self._caller = Caller(node, timeout, domain_id)
 
@@ -138,7 +160,7 @@ class LegClient:
         self, leg: str, joint_positions: ArrayLike, *, frame: str = "", assembly_mode: str = ""
     ) -> CallFuture[FootPositions]:
         """Ask as `forward_kinematics` does; return a future."""
-        joints, batch = _points("joint_positions", joint_positions)
+        joints, batch = self._points("joint_positions", joint_positions)
         request = ForwardKinematics.Request(
             leg=leg, joint_positions=to_field(joints), assembly_mode=assembly_mode
         )
@@ -186,7 +208,7 @@ class LegClient:
         passive_joints: bool = False,
     ) -> CallFuture[JointPositions]:
         """Ask as `inverse_kinematics` does; return a future."""
-        points, batch = _points("positions", positions)
+        points, batch = self._points("positions", positions)
         request = InverseKinematics.Request(
             leg=leg,
             positions=to_field(points),
@@ -253,7 +275,7 @@ class LegClient:
             field, values = "joint_positions", joint_positions
         else:
             raise InvalidInputError("give either positions or joint_positions")
-        points, batch = _points(field, values)
+        points, batch = self._points(field, values)
         request = GetJacobian.Request(
             leg=leg, assembly_mode=assembly_mode, **{field: to_field(points)}
         )
@@ -306,7 +328,7 @@ class LegClient:
         assembly_mode: str = "",
     ) -> CallFuture[Indices]:
         """Ask as `evaluate_indices` does; return a future."""
-        points, batch = _points("positions", positions)
+        points, batch = self._points("positions", positions)
         request = EvaluateIndices.Request(
             leg=leg, positions=to_field(points), assembly_mode=assembly_mode, names=list(names)
         )
@@ -359,7 +381,7 @@ class LegClient:
         assembly_mode: str = "",
     ) -> CallFuture[Efforts]:
         """Ask as `compute_efforts` does; return a future."""
-        points, batch = _points("positions", positions)
+        points, batch = self._points("positions", positions)
         request = ComputeEfforts.Request(
             leg=leg,
             positions=to_field(points),
@@ -381,6 +403,321 @@ class LegClient:
             )
 
         return self._call("compute_efforts", request, decode)
+
+    # ------------------------------------------------------------------ planning
+
+    def query_footholds(
+        self,
+        leg: str,
+        positions: ArrayLike,
+        ground: Ground | str | float,
+        load: float = 0.0,
+        *,
+        moment: ArrayLike = (0.0, 0.0, 0.0),
+        any_direction_moment: float = 0.0,
+        bias_efforts: ArrayLike = (),
+        frame: str = "",
+        efforts: bool = False,
+    ) -> Footholds:
+        """Return what the leg can carry at candidate footholds.
+
+        Args:
+            leg: Name of the leg; "" if the robot has exactly one.
+            positions: Candidates (..., 3) [m].
+            ground: The ground: its name, its friction coefficient, or a `Ground` with a normal.
+            load: Force normal to the ground that has to be borne [N].
+            moment: Moment of the ground on the foot (3,) [N.m]; zero on hard ground.
+            any_direction_moment: Further horizontal moment of unknown direction [N.m].
+            bias_efforts: Efforts that the actuators exert anyway (n,) [N.m or N]; () for none.
+            frame: Frame of all vectors: the leg's own ("" or its name) or the base frame.
+            efforts: Whether to return joint efforts and forces, too.
+        """
+        return self.query_footholds_async(
+            leg,
+            positions,
+            ground,
+            load,
+            moment=moment,
+            any_direction_moment=any_direction_moment,
+            bias_efforts=bias_efforts,
+            frame=frame,
+            efforts=efforts,
+        ).wait()
+
+    def query_footholds_async(
+        self,
+        leg: str,
+        positions: ArrayLike,
+        ground: Ground | str | float,
+        load: float = 0.0,
+        *,
+        moment: ArrayLike = (0.0, 0.0, 0.0),
+        any_direction_moment: float = 0.0,
+        bias_efforts: ArrayLike = (),
+        frame: str = "",
+        efforts: bool = False,
+    ) -> CallFuture[Footholds]:
+        """Ask as `query_footholds` does; return a future."""
+        points, batch = self._points("positions", positions)
+        request = QueryFootholds.Request(
+            leg=leg,
+            positions=to_field(points),
+            ground=ground_message(ground),
+            required_load=_number("load", load),
+            required_moment=_vector("moment", moment),
+            any_direction_moment=_number("any_direction_moment", any_direction_moment),
+            bias_efforts=to_field(_points("bias_efforts", bias_efforts)[0]),
+            include_efforts=efforts,
+        )
+        request.header.frame_id = frame
+
+        def decode(response: Any) -> Footholds:
+            status = _status(response, batch, "positions", points)
+            names = tuple(response.joint_names)
+            return Footholds(
+                from_field(response.verdict, batch, np.uint8),
+                status,
+                from_field(response.load_capacity, batch),
+                from_field(response.rated_friction, batch),
+                from_field(response.rated_friction_full, batch),
+                from_field(response.friction_margin, batch),
+                from_field(response.utilisation, batch),
+                from_field(response.limiting_joint, batch, np.int32),
+                from_field(response.ranking, dtype=np.int32),
+                response.best,
+                response.friction_coefficient,
+                names,
+                from_field(response.joint_efforts, (*batch, len(names))),
+                from_field(response.forces, (*batch, 3 if efforts else 0)),
+            )
+
+        return self._call("query_footholds", request, decode)
+
+    def query_step_length(
+        self,
+        legs: str | Sequence[str],
+        heights: ArrayLike,
+        ground: Ground | str | float,
+        load: float = 0.0,
+        *,
+        lateral_offsets: ArrayLike = (),
+        direction: ArrayLike = (0.0, 0.0, 0.0),
+        moment: ArrayLike = (0.0, 0.0, 0.0),
+        any_direction_moment: float = 0.0,
+        by_rated_friction: bool = False,
+        frame: str = "",
+    ) -> StepLengths:
+        """Return how far the next step may go, of each leg and of all together.
+
+        Args:
+            legs: Name of a leg, or names of several; () for all.
+            heights: z of the ground in the frame (...,) [m]; -0.8 if the body is 0.8 m above it.
+            ground: The ground: its name, its friction coefficient, or a `Ground` with a normal.
+            load: Force normal to the ground that each leg has to bear [N].
+            lateral_offsets: Distance of each leg's line from the origin of its own frame, to the
+                right of the walking direction (L,), or one for all [m]; () for none.
+            direction: Walking direction, horizontal (3,) of any length; zero is forward.
+            moment: Moment of the ground on the foot (3,) [N.m]; zero on hard ground.
+            any_direction_moment: Further horizontal moment of unknown direction [N.m].
+            by_rated_friction: Whether a point is feasible where the ground offers the rated
+                friction, whatever the load.
+            frame: Frame of all vectors: "" is the leg's own for one leg, the base for several.
+        """
+        return self.query_step_length_async(
+            legs,
+            heights,
+            ground,
+            load,
+            lateral_offsets=lateral_offsets,
+            direction=direction,
+            moment=moment,
+            any_direction_moment=any_direction_moment,
+            by_rated_friction=by_rated_friction,
+            frame=frame,
+        ).wait()
+
+    def query_step_length_async(
+        self,
+        legs: str | Sequence[str],
+        heights: ArrayLike,
+        ground: Ground | str | float,
+        load: float = 0.0,
+        *,
+        lateral_offsets: ArrayLike = (),
+        direction: ArrayLike = (0.0, 0.0, 0.0),
+        moment: ArrayLike = (0.0, 0.0, 0.0),
+        any_direction_moment: float = 0.0,
+        by_rated_friction: bool = False,
+        frame: str = "",
+    ) -> CallFuture[StepLengths]:
+        """Ask as `query_step_length` does; return a future."""
+        values = np.asarray(heights, dtype=np.float64)
+        request = QueryStepLength.Request(
+            legs=[legs] if isinstance(legs, str) else list(legs),
+            heights=to_field(values),
+            lateral_offsets=to_field(lateral_offsets),
+            direction=_vector("direction", direction),
+            ground=ground_message(ground),
+            required_load=_number("load", load),
+            required_moment=_vector("moment", moment),
+            any_direction_moment=_number("any_direction_moment", any_direction_moment),
+            criterion=QueryStepLength.Request.RATED_FRICTION
+            if by_rated_friction
+            else QueryStepLength.Request.CAPACITY,
+        )
+        request.header.frame_id = frame
+
+        def decode(response: Any) -> StepLengths:
+            batch = (len(response.legs), *values.shape)
+            profile = (*batch, response.profile_points)
+            return StepLengths(
+                tuple(response.legs),
+                from_field(response.lengths, batch),
+                from_field(response.starts, (*batch, 3)),
+                from_field(response.ends, (*batch, 3)),
+                from_field(response.start_limits, batch, np.uint8),
+                from_field(response.end_limits, batch, np.uint8),
+                from_field(response.load_capacity, profile),
+                from_field(response.rated_friction, profile),
+                from_field(response.common_lengths, values.shape),
+                from_field(response.limiting_leg, values.shape, np.int32),
+                response.best_height,
+                response.friction_coefficient,
+            )
+
+        return self._call("query_step_length", request, decode)
+
+    # ------------------------------------------------------------------ maps
+
+    def index_map(
+        self,
+        leg: str,
+        height: float,
+        resolution: float,
+        layers: Sequence[str] = (),
+        ground: Ground | str | float = 0.0,
+    ) -> IndexMap:
+        """Return indices over a horizontal plane of a leg's workspace.
+
+        Args:
+            leg: Name of the leg; "" if the robot has exactly one.
+            height: z of the plane in the leg's own frame [m].
+            resolution: Spacing of the grid [m].
+            layers: Names of indices, or "load_capacity"; none for all that the leg has.
+            ground: The ground, for the layer "load_capacity".
+        """
+        return self.index_map_async(leg, height, resolution, layers, ground).wait()
+
+    def index_map_async(
+        self,
+        leg: str,
+        height: float,
+        resolution: float,
+        layers: Sequence[str] = (),
+        ground: Ground | str | float = 0.0,
+    ) -> CallFuture[IndexMap]:
+        """Ask as `index_map` does; return a future."""
+        request = GetIndexMap.Request(
+            leg=leg,
+            height=_number("height", height),
+            resolution=_number("resolution", resolution),
+            layers=list(layers),
+            ground=ground_message(ground),
+        )
+
+        def decode(response: Any) -> IndexMap:
+            names = tuple(response.layers)
+            shape = (response.ny, response.nx)
+            return IndexMap(
+                response.x0 + response.resolution * np.arange(response.nx),
+                response.y0 + response.resolution * np.arange(response.ny),
+                response.height,
+                names,
+                tuple(response.symbols),
+                tuple(response.units),
+                from_field(response.values, (*shape, len(names))),
+                from_field(response.status, shape, np.uint8),
+            )
+
+        return self._call("get_index_map", request, decode)
+
+    def compute_index_map(
+        self,
+        leg: str,
+        resolution: float,
+        layers: Sequence[str] = (),
+        ground: Ground | str | float = 0.0,
+        *,
+        frame: str = "",
+        on_progress: Callable[[MapProgress], None] = lambda progress: None,
+    ) -> IndexCloud:
+        """Return indices over the whole workspace of a leg.
+
+        The client's timeout does not count for the work, but for the node's silence.
+
+        Args:
+            leg: Name of the leg; "" if the robot has exactly one.
+            resolution: Spacing of the grid [m].
+            layers: Names of indices, or "load_capacity"; none for all that the leg has.
+            ground: The ground, for the layer "load_capacity".
+            frame: Frame of the points: the leg's own ("" or its name) or the base frame.
+            on_progress: Called in the client's thread now and then; what it raises ends the work.
+        """
+        return self.compute_index_map_async(
+            leg, resolution, layers, ground, frame=frame, on_progress=on_progress
+        ).wait()
+
+    def compute_index_map_async(
+        self,
+        leg: str,
+        resolution: float,
+        layers: Sequence[str] = (),
+        ground: Ground | str | float = 0.0,
+        *,
+        frame: str = "",
+        on_progress: Callable[[MapProgress], None] = lambda progress: None,
+    ) -> GoalFuture[IndexCloud]:
+        """Ask as `compute_index_map` does; return a future.
+
+        Its `cancel` stops the work; `wait` then raises a `CancelledError` that has what was
+        computed until then as its `partial`.
+        """
+        goal = ComputeIndexMap.Goal(
+            leg=leg,
+            resolution=_number("resolution", resolution),
+            layers=list(layers),
+            ground=ground_message(ground),
+        )
+        goal.header.frame_id = frame
+
+        def decode(result: Any) -> IndexCloud:
+            positions, fields = from_cloud(result.cloud)
+            names = tuple(result.layers)
+            columns = [fields[name] for name in names if name in fields]
+            values = np.stack(columns, axis=-1) if columns else np.empty((len(positions), 0))
+            return IndexCloud(
+                positions,
+                names,
+                tuple(result.units),
+                values.astype(np.float64),
+                result.cloud.header.frame_id,
+                result.fraction,
+                result.elapsed,
+            )
+
+        def tell(feedback: Any) -> None:
+            on_progress(
+                MapProgress(
+                    feedback.fraction,
+                    feedback.elapsed,
+                    feedback.remaining,
+                    tuple(feedback.layers),
+                    from_field(feedback.best),
+                    from_field(feedback.best_positions, (-1, 3)),
+                )
+            )
+
+        return send_goal(self._caller, self._map_action, goal, decode, tell)
 
     # ------------------------------------------------------------------ robot
 
@@ -463,6 +800,16 @@ class LegClient:
         message = self._caller.latest(self._effort_limits_topic, EffortLimitsMessage)
         return EffortLimits.from_message(message)
 
+    def _points(self, field: str, values: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+        """Return points (..., k) as an array, and their leading axes, if they are not too many."""
+        points, batch = _points(field, values)
+        if math.prod(batch) > self._max_points:
+            raise TooLargeError(
+                f"{field}: {math.prod(batch)} points; allowed: at most {self._max_points} at once "
+                "(max_points of the client, and parameter max_points of the nodes)"
+            )
+        return points, batch
+
     def _call(self, service: str, request: Any, decode: Callable[[Any], Any]) -> CallFuture[Any]:
         return self._caller.call(*self._services[service], request, decode)
 
@@ -478,6 +825,21 @@ def _points(field: str, values: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]
     if points.shape == (0,):
         return points, (0,)  # no points at all, not one point of no coordinates
     return points, points.shape[:-1]
+
+
+def _number(field: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{field} must be a number: {error}") from None
+
+
+def _vector(field: str, value: ArrayLike) -> FloatArray:
+    """Return one vector (3,)."""
+    vector, _ = _points(field, value)
+    if vector.shape != (3,):
+        raise InvalidInputError(f"{field} must have shape (3,), got {vector.shape}")
+    return vector
 
 
 def _vectors(field: str, values: ArrayLike, batch: tuple[int, ...]) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from leg_msgs.msg import ErrorCode
 
 
@@ -63,9 +65,14 @@ class ServerUnavailableError(TimedOutError, ConnectionError):
 
 
 class CancelledError(LegServiceError):
-    """The caller cancelled the work, or closed the client."""
+    """The caller cancelled the work, or closed the client.
+
+    Attributes:
+        partial: What was computed until then; None if there is nothing.
+    """
 
     code = ErrorCode.CANCELLED
+    partial: Any = None
 
 
 class NotSupportedError(LegServiceError):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from leg_msgs.msg import FootholdVerdict
 from leg_msgs_py.arrays import from_field
 from numpy.typing import NDArray
 
@@ -100,6 +101,153 @@ class Efforts(NamedTuple):
     limiting_joint: NDArray[np.int32]
     status: StatusArray
     joint_names: tuple[str, ...]
+
+
+class Footholds(NamedTuple):
+    """Answer of `query_footholds`.
+
+    Attributes:
+        verdict: A `leg_msgs/FootholdVerdict` constant each (...,); 0 is feasible.
+        status: Status of the poses alone (...,).
+        load_capacity: Greatest force normal to the ground (...,) [N].
+        rated_friction: mu_e = |F_y| / |F_z| (...,).
+        rated_friction_full: The same with both horizontal components (...,).
+        friction_margin: friction_coefficient - rated_friction (...,).
+        utilisation: Largest effort / effort limit at the required load (...,), 1 = at the limit.
+        limiting_joint: Index of the joint with that utilisation (...,); -1 where there is none.
+        ranking: Flat indices of the feasible candidates, best first.
+        best: The first of them; -1 if no candidate is feasible.
+        friction_coefficient: Friction coefficient that was used.
+        joint_names: Names of the actuated joints (n); empty unless efforts were asked for.
+        joint_efforts: Efforts that hold the required load (..., n) [N.m or N].
+        forces: Ground reaction that uses the actuators least (..., 3) [N].
+    """
+
+    verdict: NDArray[np.uint8]
+    status: StatusArray
+    load_capacity: FloatArray
+    rated_friction: FloatArray
+    rated_friction_full: FloatArray
+    friction_margin: FloatArray
+    utilisation: FloatArray
+    limiting_joint: NDArray[np.int32]
+    ranking: NDArray[np.int32]
+    best: int
+    friction_coefficient: float
+    joint_names: tuple[str, ...]
+    joint_efforts: FloatArray
+    forces: FloatArray
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether the leg carries the required load (...,)."""
+        return np.asarray(self.verdict == FootholdVerdict.FEASIBLE)
+
+
+class StepLengths(NamedTuple):
+    """Answer of `query_step_length` for L legs and heights (...,).
+
+    Attributes:
+        legs: Names of the legs (L).
+        lengths: Step length of each leg (L, ...) [m]; 0 where no point is feasible.
+        starts: Rear ends (L, ..., 3) [m]; NaN where there is none.
+        ends: Front ends (L, ..., 3) [m].
+        start_limits: `leg_msgs/FootholdVerdict` just behind the rear ends (L, ...).
+        end_limits: The same just before the front ends (L, ...).
+        load_capacity: Load capacity along the stances (L, ..., P) [N].
+        rated_friction: mu_e along them (L, ..., P).
+        common_lengths: The step that all legs can make together (...,) [m].
+        limiting_leg: Index of the leg with the shortest step (...,).
+        best_height: Flat index of the longest common step; -1 if there is none.
+        friction_coefficient: Friction coefficient that was used.
+    """
+
+    legs: tuple[str, ...]
+    lengths: FloatArray
+    starts: FloatArray
+    ends: FloatArray
+    start_limits: NDArray[np.uint8]
+    end_limits: NDArray[np.uint8]
+    load_capacity: FloatArray
+    rated_friction: FloatArray
+    common_lengths: FloatArray
+    limiting_leg: NDArray[np.int32]
+    best_height: int
+    friction_coefficient: float
+
+
+class IndexMap(NamedTuple):
+    """Answer of `index_map`: layers over a plane of the leg's own frame.
+
+    Attributes:
+        x: Grid coordinates along x (nx,) [m].
+        y: Grid coordinates along y (ny,) [m].
+        height: z of the plane [m].
+        layers: Names of the layers (K).
+        symbols: The literature's symbols (K).
+        units: SI units (K).
+        values: Values (ny, nx, K); NaN outside the workspace.
+        status: Status of each point (ny, nx).
+    """
+
+    x: FloatArray
+    y: FloatArray
+    height: float
+    layers: tuple[str, ...]
+    symbols: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    status: StatusArray
+
+    def layer(self, name: str) -> FloatArray:
+        """Return the values of one layer (ny, nx)."""
+        return self.values[..., self.layers.index(name)]
+
+
+class IndexCloud(NamedTuple):
+    """Answer of `compute_index_map`: layers at the N grid points within the workspace.
+
+    Attributes:
+        positions: The points (N, 3) [m].
+        layers: Names of the layers (K).
+        units: SI units (K).
+        values: Values (N, K), to single precision; NaN where a layer is not defined.
+        frame: Frame of the points.
+        fraction: Share of the workspace that is covered, less than 1 if it was cancelled.
+        elapsed: Time that the work took [s].
+    """
+
+    positions: FloatArray
+    layers: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    frame: str
+    fraction: float
+    elapsed: float
+
+    def layer(self, name: str) -> FloatArray:
+        """Return the values of one layer (N,)."""
+        return self.values[:, self.layers.index(name)]
+
+
+class MapProgress(NamedTuple):
+    """Progress of `compute_index_map`.
+
+    Attributes:
+        fraction: Share of the workspace computed so far, 0 to 1.
+        elapsed: Time since the goal was accepted [s].
+        remaining: Estimated time until the end [s]; NaN while it is not known.
+        layers: Names of the layers (K).
+        best: Best value of each layer so far (K,).
+        best_positions: Where it is (K, 3) [m].
+    """
+
+    fraction: float
+    elapsed: float
+    remaining: float
+    layers: tuple[str, ...]
+    best: FloatArray
+    best_positions: FloatArray
 
 
 class EffortLimits(NamedTuple):

@@ -171,7 +171,7 @@ def _evaluate(
     load = _magnitude("load", contact.load, batch)
     friction = as_matching("friction", as_non_negative("friction", contact.friction), (), batch)
     any_moment = _magnitude("any_moment", contact.any_moment, batch)
-    reserve = np.zeros(len(limits))
+    reserve: FloatArray = np.zeros(len(limits))
     if np.any(any_moment > 0.0):
         reserve = worst_moment_efforts(angular) * any_moment[..., None]
     values = _footholds(

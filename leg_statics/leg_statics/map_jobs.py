@@ -206,7 +206,8 @@ class MapJob:
             effort_limits=key.limits,
             contact=key.contact,
         )
-        best, where = np.empty(0), np.empty((0, 3))
+        best: FloatArray = np.empty(0)
+        where: FloatArray = np.empty((0, 3))
         for k, self.index_map in enumerate(maps):
             plane = self.index_map._replace(
                 z=self.index_map.z[k : k + 1],

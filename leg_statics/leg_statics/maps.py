@@ -96,7 +96,9 @@ def grid_shape(mechanism: Mechanism, resolution: float) -> tuple[int, int, int]:
         ValueRangeError: If the resolution is out of range.
     """
     first, last = _grid_range(mechanism, resolution)
-    nx, ny, nz = (int(n) for n in np.minimum(last - first + 1.0, MOST_ALONG_AXIS))
+    with np.errstate(invalid="ignore"):
+        count = np.fmin(last - first + 1.0, MOST_ALONG_AXIS)
+    nx, ny, nz = (int(n) for n in count)
     return nz, ny, nx
 
 
@@ -106,12 +108,13 @@ def best_points(index_map: IndexMap) -> tuple[FloatArray, FloatArray]:
     values = index_map.values.reshape(-1, count)
     signs = [1.0 if find_layer(name).better == "low" else -1.0 for name in index_map.layers]
     costs = np.where(np.isnan(values), np.inf, values * signs)
-    found = ~np.isnan(values).all(axis=0)
+    found = np.any(~np.isnan(values), axis=0)
     where = np.argmin(costs, axis=0)
     z, y, x = np.unravel_index(where, index_map.status.shape)
     positions = np.stack([index_map.x[x], index_map.y[y], index_map.z[z]], axis=-1)
     best = values[where, np.arange(count)]
-    return np.where(found, best, np.nan), np.where(found[:, None], positions, np.nan)
+    positions[~found] = np.nan
+    return np.where(found, best, np.nan), positions
 
 
 def plane_map(
@@ -190,7 +193,9 @@ def _grid_range(mechanism: Mechanism, resolution: float) -> tuple[FloatArray, Fl
     if not 0.0 < resolution < np.inf:
         raise ValueRangeError(f"resolution must be > 0 m, got {resolution}")
     bounds = workspace_bounds(mechanism)
-    return np.floor(bounds[:, 0] / resolution), np.ceil(bounds[:, 1] / resolution)
+    with np.errstate(over="ignore"):
+        first, last = (bounds / resolution).T
+    return np.floor(first), np.ceil(last)
 
 
 def _layers(

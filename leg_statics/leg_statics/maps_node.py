@@ -1,4 +1,4 @@
-"""The maps node: index maps of the legs of one robot, and pictures of the legs for RViz and Foxglove.
+"""The maps node: index maps of the legs of one robot, and markers that show the legs.
 
 It is a process of its own, so that a map never delays the answer to a query.
 """
@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.errors import LegError, NotSupportedError
+from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
 from leg_kinematics.mechanism import Posture
 from leg_kinematics.requests import LegFrame, RequestError, check_count, error_code, find_frame
 from leg_kinematics.robot import Leg, Robot
@@ -32,7 +32,7 @@ from leg_statics.contacts import declare_grounds, read_ground
 from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices
 from leg_statics.map_jobs import MapJob, MapKey, MapMemory
-from leg_statics.maps import IndexMap, find_layer, grid_shape
+from leg_statics.maps import IndexMap, find_layer, grid_shape, supported_layers
 from leg_statics.markers import (
     Scene,
     grid_points,
@@ -79,7 +79,7 @@ class MapsNode(RobotNode):
             self,
             ComputeIndexMap,
             "~/compute_index_map",
-            execute_callback=self._refuse_goal,
+            execute_callback=lambda handle: None,  # every goal is given its own
             handle_accepted_callback=self._accept_goal,
             cancel_callback=self._cancel_goal,
             result_timeout=RESULT_TIMEOUT,
@@ -231,30 +231,36 @@ class MapsNode(RobotNode):
 
     def _accept_goal(self, handle: Any) -> None:
         """Begin a goal; one that cannot be carried out is ended with the reason."""
-        request = handle.request
         try:
-            leg = self.robot.leg(request.leg)
-            frame = find_frame(self.robot, leg, request.header.frame_id)
-            if len(self._goals) >= MOST_GOALS:
-                raise RequestError(
-                    f"goal: {len(self._goals)} maps are waiting; allowed: {MOST_GOALS}",
-                    ErrorCode.TOO_LARGE,
-                )
-            job = MapJob(self._key(leg, request, frame, None), self._memory, self._pool)
+            self._goals[bytes(handle.goal_id.uuid)] = self._begin(handle)
+            self._goal_timer.reset()
         except Exception as error:
-            reason = error
-            handle.execute(lambda handle: self._refuse_goal(handle, reason))
-            return
-        self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, leg, frame, job)
-        self._goal_timer.reset()
+            refusal = self._refusal(error)
+            handle.execute(lambda handle: self._abort(handle, refusal))
 
-    def _refuse_goal(self, handle: Any, error: Exception | None = None) -> Any:
-        error = error or RequestError("goal: it was not begun")
-        result = ComputeIndexMap.Result()
-        result.error.code = error_code(error)
-        result.error.message = self._failure("compute_index_map", error)
+    def _begin(self, handle: Any) -> _Goal:
+        request = handle.request
+        leg = self.robot.leg(request.leg)
+        frame = find_frame(self.robot, leg, request.header.frame_id)
+        key = self._key(leg, request, frame, None)
+        unknown = set(request.layers) - set(supported_layers(leg.mechanism))
+        if unknown:
+            raise UnknownNameError("layer", unknown.pop(), supported_layers(leg.mechanism))
+        if len(self._goals) >= MOST_GOALS:
+            raise RequestError(
+                f"goal: {len(self._goals)} maps are waiting; allowed: {MOST_GOALS}",
+                ErrorCode.TOO_LARGE,
+            )
+        return _Goal(handle, leg, frame, MapJob(key, self._memory, self._pool))
+
+    def _refusal(self, error: Exception) -> ErrorCode:
+        """Record what was raised, and return it for a result."""
+        message = self._failure("compute_index_map", error)
+        return ErrorCode(code=error_code(error), message=message)
+
+    def _abort(self, handle: Any, error: ErrorCode) -> Any:
         handle.abort()
-        return result
+        return ComputeIndexMap.Result(error=error)
 
     def _cancel_goal(self, handle: Any) -> CancelResponse:
         goal = self._goals.get(bytes(handle.goal_id.uuid))
@@ -279,7 +285,7 @@ class MapsNode(RobotNode):
             try:
                 goal.job.check()
             except Exception as error:
-                return self._refuse_goal(goal.handle, error)
+                return self._abort(goal.handle, self._refusal(error))
             index_map, progress = goal.job.index_map, goal.job.progress
             result = ComputeIndexMap.Result(
                 fraction=progress.fraction,

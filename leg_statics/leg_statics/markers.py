@@ -65,7 +65,8 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
     linkage = mechanism.linkage(posture)
     ends = [pair for bar in linkage.bars for pair in itertools.pairwise(bar)]
     foot = posture.foot_position[:3]
-    cone, polytope = np.empty((0, 3)), np.empty((0, 3))
+    cone: FloatArray = np.empty((0, 3))
+    polytope: FloatArray = np.empty((0, 3))
     if posture.status == Status.OK and mechanism.task_coordinates == ("x", "y", "z"):
         cone = foot + _cone_lines(scene.friction)
         jacobian = mechanism.jacobian(posture)

@@ -169,7 +169,7 @@ class StaticsNode(RobotNode):
         response.limiting_joint = to_field(found.limiting_joint, np.int32)
         response.ranking = to_field(ranking, np.int32)
         response.best = int(ranking[0]) if len(ranking) else -1
-        response.friction_coefficient = float(contact.friction)
+        response.friction_coefficient = float(np.asarray(contact.friction))
         if request.include_efforts:
             response.joint_names = list(leg.joint_names)
             response.joint_efforts = to_field(found.efforts)

@@ -58,7 +58,7 @@ def fill_step_length(
         criterion=_criterion(request),
     )
     _fill(response, legs, common)
-    response.friction_coefficient = float(contact.friction)
+    response.friction_coefficient = float(np.asarray(contact.friction))
 
 
 def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:

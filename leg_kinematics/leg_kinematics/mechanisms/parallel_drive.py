@@ -45,7 +45,7 @@ from leg_kinematics.mechanism import (
     offset,
     parameter,
 )
-from leg_kinematics.scalars import included_angle, swing_plane, within, wrapped
+from leg_kinematics.scalars import arctan2, included_angle, swing_plane, within, wrapped
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`
@@ -348,7 +348,7 @@ def outer_crank(
 @scalar
 def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> Pose:
     """Return the pose that puts the foot at a point of {C}, in closed form; NaN out of reach."""
-    radius = math.hypot(x, z)
+    radius = math.sqrt(x * x + z * z)
     c3, s3 = -z / radius, -x / radius
     c1, s1, c2, s2 = two_link(y, -radius, g.l4 + g.l5 + g.l7, g.l6, branch.knee)
 
@@ -359,7 +359,7 @@ def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> P
     sb = sx / g.l3
     cb = math.sqrt(1.0 - sb * sb)
     reach = g.l3 * cb
-    arm = math.hypot(reach, g.l33)
+    arm = math.sqrt(reach * reach + g.l33 * g.l33)
     cp3, sp3, ce, se = two_link(sy - g.e, sz + g.h1, g.m3, arm, branch.center)
     ca, sa = (ce * reach + se * g.l33) / arm, (se * reach - ce * g.l33) / arm
 
@@ -382,14 +382,14 @@ def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> P
 @scalar
 def angles_of_pose(g: Geometry, p: Pose, q: FloatArray, closure: FloatArray) -> None:
     """Fill the crank angles (3,) and the closure a, b, th1, th2, th3 of a pose."""
-    q[0] = wrapped(math.atan2(p.sp1, p.cp1) - g.phi1)
-    q[1] = wrapped(math.atan2(p.sp2, p.cp2) - g.phi1)
-    q[2] = wrapped(math.atan2(p.sp3, p.cp3) - g.phi3)
-    closure[0] = math.atan2(p.sa, p.ca)
-    closure[1] = math.asin(p.sb)
-    closure[2] = math.atan2(p.s1, p.c1)
-    closure[3] = math.atan2(p.s2, p.c2)
-    closure[4] = math.atan2(p.s3, p.c3)
+    q[0] = wrapped(arctan2(p.sp1, p.cp1) - g.phi1)
+    q[1] = wrapped(arctan2(p.sp2, p.cp2) - g.phi1)
+    q[2] = wrapped(arctan2(p.sp3, p.cp3) - g.phi3)
+    closure[0] = arctan2(p.sa, p.ca)
+    closure[1] = arctan2(p.sb, p.cb)
+    closure[2] = arctan2(p.s1, p.c1)
+    closure[3] = arctan2(p.s2, p.c2)
+    closure[4] = arctan2(p.s3, p.c3)
 
 
 @scalar
@@ -427,9 +427,9 @@ def in_platform(p: Pose, x: float, y: float, z: float) -> tuple[float, float, fl
 def axis_angles(p: Pose) -> tuple[float, float, float]:
     """Return the angles of U1, U2, U3 about their axes along the cranks', from the cranks."""
     return (
-        math.atan2(p.cp1 * p.z1 - p.sp1 * p.y1, p.cp1 * p.y1 + p.sp1 * p.z1),
-        math.atan2(p.cp2 * p.z2 - p.sp2 * p.y2, p.cp2 * p.y2 + p.sp2 * p.z2),
-        math.atan2(p.cp3 * p.sa - p.sp3 * p.ca, p.cp3 * p.ca + p.sp3 * p.sa),
+        arctan2(p.cp1 * p.z1 - p.sp1 * p.y1, p.cp1 * p.y1 + p.sp1 * p.z1),
+        arctan2(p.cp2 * p.z2 - p.sp2 * p.y2, p.cp2 * p.y2 + p.sp2 * p.z2),
+        arctan2(p.cp3 * p.sa - p.sp3 * p.ca, p.cp3 * p.ca + p.sp3 * p.sa),
     )
 
 

@@ -71,7 +71,7 @@ def compare_number(
         paper,
         item,
         f"{published:g}{suffix}",
-        f"{ours:.4g}{suffix}",
+        f"{ours:.5g}{suffix}",
         f"{100.0 * difference:+.2f} %",
         verdict,
         note,

@@ -1,0 +1,1 @@
+"""Programs that entries start as processes of their own."""

@@ -1,0 +1,33 @@
+"""The least a node can do, run as the suite's nodes are: an empty service and a relay."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from leg_kinematics.robot_node import SERVICE_QOS, run
+
+
+class EmptyNode(Node):
+    """Answers a Trigger with nothing and publishes joint states as they come."""
+
+    def __init__(self) -> None:
+        super().__init__("empty")
+        self.create_service(Trigger, "~/trigger", self.answer, qos_profile=SERVICE_QOS)
+        self._relay = self.create_publisher(JointState, "~/joint_states", 10)
+        self.create_subscription(
+            JointState, "joint_states", self._relay.publish, qos_profile_sensor_data
+        )
+
+    def answer(self, request: Any, response: Any) -> Any:
+        """Answer an empty request."""
+        return response
+
+
+if __name__ == "__main__":
+    sys.exit(run(EmptyNode))  # type: ignore[arg-type]  it needs no more of a RobotNode

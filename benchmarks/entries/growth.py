@@ -1,0 +1,86 @@
+"""Time per point and memory by the number of points in a call."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from harness import Row, Settings, Timing, measure, timed_row
+from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
+
+from leg_kinematics.mechanism import inverse_with_jacobians
+from leg_statics.capacity import load_capacity
+from leg_statics.footholds import evaluate_footholds
+
+HERE = Path(__file__).resolve().parent.parent
+PICTURE = HERE / "results" / "growth.png"
+CHUNK = 100_000
+
+
+def rows(settings: Settings) -> Iterator[Row]:
+    """Yield times per point, draw them, and yield peaks of memory."""
+    leg = hexapod_leg()
+    mechanism = leg.mechanism
+    lower, upper = leg.effort_limits.T
+    few = reachable_positions(mechanism)
+    counts = [10**k for k in range(settings.count(7, 5))]
+    times: dict[str, list[Timing]] = {}
+    for count in counts:
+        feet = np.resize(few, (count, 3)) if count > BATCH else few[:count]
+        _, jacobian, _ = inverse_with_jacobians(mechanism, feet)
+        for name, function in (
+            ("inverse", lambda feet=feet: mechanism.inverse(feet)),
+            ("load_capacity", lambda j=jacobian: load_capacity(j, lower, upper, FRICTION)),
+            (
+                "evaluate_footholds",
+                lambda feet=feet: evaluate_footholds(mechanism, leg.effort_limits, feet, CONTACT),
+            ),
+        ):
+            timing = measure(function, settings, count)
+            times.setdefault(name, []).append(timing)
+            yield timed_row(f"{name}, {count:,} points", timing, note="per point")
+    draw(counts, times)
+
+    once, many = settings.count(1_000_000, 100_000), settings.count(10_000_000, 1_000_000)
+    yield Row(
+        f"memory, {once:,} footholds in one call",
+        memory(once, once),
+        "B",
+        note="peak beyond that before",
+    )
+    yield Row(
+        f"memory, {many:,} footholds, {CHUNK:,} a call",
+        memory(many, CHUNK),
+        "B",
+        note=f"cut by the caller, not by the function; {8e-6 * many:.0f} MB of it are kept",
+    )
+
+
+def memory(count: int, chunk: int) -> float:
+    """Return by how much the peak of memory grows in a fresh process [B]."""
+    program = HERE / "children" / "memory.py"
+    answer = subprocess.run(
+        [sys.executable, program, str(count), str(chunk)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(answer.stdout)
+
+
+def draw(counts: list[int], times: dict[str, list[Timing]]) -> None:
+    """Save time per point by number of points as a picture."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    for name, timings in times.items():
+        axes.loglog(counts, [1e6 * t.median for t in timings], marker="o", label=name)
+    axes.set(xlabel="points in one call", ylabel="time per point [µs]")
+    axes.grid(which="both", alpha=0.3)
+    axes.legend()
+    PICTURE.parent.mkdir(exist_ok=True)
+    figure.savefig(PICTURE, dpi=150)

@@ -1,0 +1,184 @@
+"""Service round trips: one point against an empty service, and where the time of 10,000 goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from harness import Goal, Row, Settings, Timing, measure, missing_row
+from leg_msgs.msg import Ground
+from leg_msgs.srv import InverseKinematics, QueryFootholds
+from leg_msgs_py.arrays import from_field, to_field
+from leg_msgs_py.client import LegClient
+from ros import Client, child, suite_nodes
+from std_srvs.srv import Trigger
+from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
+
+from leg_kinematics.arrays import FloatArray
+from leg_statics.footholds import evaluate_footholds
+
+LEG = "right_front"
+ONE_POINT = Goal(1.5, accepted=2.0)
+FOOTHOLD_FIELDS = {  # of the response, with the type of their numbers
+    "verdict": np.uint8,
+    "status": np.uint8,
+    "load_capacity": np.float64,
+    "rated_friction": np.float64,
+    "rated_friction_full": np.float64,
+    "friction_margin": np.float64,
+    "utilisation": np.float64,
+    "limiting_joint": np.int32,
+    "ranking": np.int32,
+}
+
+
+def rows(settings: Settings) -> Iterator[Row]:
+    """Yield round trips of all services, asked in turn, and the parts of a large one."""
+    feet = reachable_positions(hexapod_leg(LEG).mechanism)
+    settings.show("starting nodes")
+    with suite_nodes("kinematics", "statics"), child("empty_node"), Client() as client:
+        trigger = client.service(Trigger, "/empty/trigger")
+        inverse = client.service(InverseKinematics, "/kinematics/inverse_kinematics")
+        if trigger is None or inverse is None:
+            raise TimeoutError("the nodes do not start: see results/nodes.log")
+        footholds = client.service(QueryFootholds, "/statics/query_footholds", 10.0)
+
+        calls: dict[str, Callable[[], Any]] = {
+            "empty Trigger": lambda: client.call(trigger, Trigger.Request()),
+            "inverse_kinematics": lambda: client.call(inverse, inverse_request(feet[0])),
+        }
+        if footholds is not None:
+            calls["query_footholds"] = lambda: client.call(footholds, foothold_request(feet[0]))
+        else:
+            yield missing_row("query_footholds", "the statics node does not serve it")
+        settings.show("one point")
+        yield from one_point(calls, settings)
+        yield from through_leg_client(feet[0], settings)
+
+        settings.show(f"{BATCH:,} points")
+        samples = sample(
+            {"points": lambda: decode_inverse(client.call(inverse, inverse_request(feet)))},
+            settings.count(200, 10),
+        )
+        yield from percentiles(f"inverse_kinematics, {BATCH:,} points", samples["points"])
+        if footholds is not None:
+            yield from parts_of_footholds(
+                lambda: decode_footholds(client.call(footholds, foothold_request(feet))),
+                feet,
+                settings,
+            )
+
+
+def one_point(calls: dict[str, Callable[[], Any]], settings: Settings) -> Iterator[Row]:
+    """Yield round trips of one point and their ratios to the empty one."""
+    samples = sample(calls, settings.count(3000, 100))
+    medians = {}
+    for name, durations in samples.items():
+        yield from percentiles(name, durations)
+        medians[name] = float(np.median(durations))
+    empty = medians.pop("empty Trigger")
+    for name, median in medians.items():
+        yield Row(f"{name} / empty Trigger", median / empty, "x", goal=ONE_POINT)
+
+
+def through_leg_client(foot: FloatArray, settings: Settings) -> Iterator[Row]:
+    """Yield the round trip of one point through the client for planners."""
+    with LegClient() as legs:
+        legs.inverse_kinematics(LEG, foot)
+        samples = sample(
+            {"ask": lambda: legs.inverse_kinematics(LEG, foot)}, settings.count(1000, 50)
+        )
+    note = "a client with a thread of its own"
+    yield from percentiles("LegClient.inverse_kinematics", samples["ask"], note=note)
+
+
+def parts_of_footholds(
+    ask: Callable[[], Any], feet: FloatArray, settings: Settings
+) -> Iterator[Row]:
+    """Yield the round trip of a large request, and what of it is mathematics and conversion."""
+    leg = hexapod_leg(LEG)
+    durations = sample({"ask": ask}, settings.count(200, 10))["ask"]
+    yield from percentiles(f"query_footholds, {BATCH:,} points", durations, Goal(10e-3))
+
+    def evaluate() -> Any:
+        found = evaluate_footholds(leg.mechanism, leg.effort_limits, feet, CONTACT)
+        return found, found.ranking()
+
+    mathematics = measure(evaluate, settings)
+    found, ranking = evaluate()
+    arrays = {
+        **{field: getattr(found, field, None) for field in FOOTHOLD_FIELDS},
+        "status": found.posture.status,
+        "ranking": ranking,
+    }
+
+    def convert() -> None:
+        """Do what both sides do: fields of request and response, both ways."""
+        from_field(to_field(feet), (-1, 3))
+        for field, dtype in FOOTHOLD_FIELDS.items():
+            from_field(to_field(arrays[field], dtype), dtype=dtype)
+
+    conversion = measure(convert, settings)
+    rest = float(np.median(durations)) - mathematics.median - conversion.median
+    yield part("mathematics", mathematics, "evaluated in this process")
+    yield part("conversion", conversion, "arrays to message fields and back")
+    yield Row("  of it DDS and executors", rest, note="the remainder, with (de)serialisation")
+
+
+def part(name: str, timing: Timing, note: str) -> Row:
+    """Return a row of a part of the round trip."""
+    return Row(f"  of it {name}", timing.median, "s", timing.p95, note=note)
+
+
+def sample(calls: dict[str, Callable[[], Any]], count: int) -> dict[str, list[float]]:
+    """Return durations of calls made in turn, after a warm-up."""
+    durations: dict[str, list[float]] = {name: [] for name in calls}
+    for k in range(-max(3, count // 10), count):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            if k >= 0:
+                durations[name].append(time.perf_counter() - start)
+    return durations
+
+
+def percentiles(
+    name: str, durations: list[float], goal: Goal | None = None, note: str = ""
+) -> Iterator[Row]:
+    """Yield median with p95, and p99."""
+    p50, p95, p99 = map(float, np.percentile(durations, [50.0, 95.0, 99.0]))
+    yield Row(name, p50, "s", p95, goal, note or f"{len(durations)} round trips")
+    yield Row(f"{name}, p99", p99)
+
+
+def inverse_request(feet: FloatArray) -> Any:
+    """Return a request for foot positions."""
+    return InverseKinematics.Request(leg=LEG, positions=to_field(feet))
+
+
+def decode_inverse(response: Any) -> FloatArray:
+    """Return the joint positions of a response."""
+    joints: FloatArray = from_field(response.joint_positions, (-1, 3))
+    assert len(joints) == len(response.status) > 0, response.error.message
+    return joints
+
+
+def foothold_request(feet: FloatArray) -> Any:
+    """Return a request for foothold candidates."""
+    return QueryFootholds.Request(
+        leg=LEG,
+        positions=to_field(feet),
+        ground=Ground(friction_coefficient=FRICTION),
+        required_load=float(np.asarray(CONTACT.load)),
+    )
+
+
+def decode_footholds(response: Any) -> dict[str, Any]:
+    """Return the arrays of a response."""
+    assert len(response.verdict) > 0, response.error.message
+    return {
+        field: from_field(getattr(response, field), dtype=dtype)
+        for field, dtype in FOOTHOLD_FIELDS.items()
+    }

@@ -1,0 +1,44 @@
+"""One point through the public functions: what a planner pays that asks point by point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from harness import Goal, Row, Settings, measure, timed_row
+from workload import CONTACT, FRICTION, hexapod_leg, reachable_positions
+
+from leg_kinematics.mechanism import inverse_with_jacobians
+from leg_statics.capacity import load_capacity
+from leg_statics.footholds import evaluate_footholds
+
+GOAL = Goal(10e-6)
+
+
+def rows(settings: Settings) -> Iterator[Row]:
+    """Yield one call of each function."""
+    leg = hexapod_leg()
+    mechanism = leg.mechanism
+    foot = reachable_positions(mechanism)[0]
+    posture = mechanism.inverse(foot)
+    jacobian = mechanism.jacobian(posture)
+    lower, upper = leg.effort_limits.T
+    mirrored = hexapod_leg("left_front").mechanism
+    mirrored_foot = reachable_positions(mirrored)[0]
+    for name, function, goal in (
+        ("inverse", lambda: mechanism.inverse(foot), GOAL),
+        ("load_capacity", lambda: load_capacity(jacobian, lower, upper, FRICTION), GOAL),
+        (
+            "evaluate_footholds",
+            lambda: evaluate_footholds(mechanism, leg.effort_limits, foot, CONTACT),
+            GOAL,
+        ),
+        (
+            "evaluate_footholds, mirrored leg",
+            lambda: evaluate_footholds(mirrored, leg.effort_limits, mirrored_foot, CONTACT),
+            None,
+        ),
+        ("inverse_with_jacobians", lambda: inverse_with_jacobians(mechanism, foot), None),
+        ("forward", lambda: mechanism.forward(posture.joint_positions), None),
+        ("jacobian", lambda: mechanism.jacobian(posture), None),
+    ):
+        yield timed_row(name, measure(function, settings), goal, "one point a call")

@@ -1,0 +1,1 @@
+"""The same questions put to other software, on the same inputs."""

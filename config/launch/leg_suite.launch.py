@@ -1,0 +1,38 @@
+"""Start the nodes of one robot: `ros2 launch leg_bringup leg_suite.launch.py robot:=hexapod`."""
+
+from pathlib import Path
+
+import yaml
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+NODES = Path(__file__).resolve().parent.parent / "nodes.yaml"
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the nodes of `nodes.yaml` with the robot and namespace asked for."""
+    robot = ParameterValue(LaunchConfiguration("robot"), value_type=str)
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "robot", default_value="hexapod", description="YAML file or name of a shipped robot"
+            ),
+            DeclareLaunchArgument(
+                "namespace", default_value="", description="Namespace of the robot's nodes"
+            ),
+            *(
+                Node(
+                    package=node["package"],
+                    executable=node["executable"],
+                    name=node["name"],
+                    namespace=LaunchConfiguration("namespace"),
+                    parameters=[{"robot": robot}],
+                    output="screen",
+                )
+                for node in yaml.safe_load(NODES.read_text())["nodes"]
+            ),
+        ]
+    )

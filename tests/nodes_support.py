@@ -1,0 +1,28 @@
+"""What the tests of the nodes share."""
+
+import time
+
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+
+START_TIMEOUT = 180.0  # the first start on a machine compiles [s]
+MAX_POINTS = 1000
+
+
+def wait_for(condition, timeout=20.0):
+    """Return the first true value of `condition()`, polled."""
+    deadline = time.monotonic() + timeout
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"nothing within {timeout} s"
+        time.sleep(0.01)
+    return value
+
+
+def set_parameter(node, server, name, value):
+    """Set a parameter of a node and return the result."""
+    client = node.create_client(SetParameters, f"/{server}/set_parameters")
+    wait_for(client.service_is_ready)
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    answer = client.call(request, timeout_sec=60.0)
+    node.destroy_client(client)
+    return answer.results[0]
