@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import Field, dataclass, field, fields
+from functools import cached_property
+from itertools import product
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -161,40 +163,58 @@ def geometry_parameters(mechanism: Any) -> tuple[Field[Any], ...]:
     return tuple(f for f in fields(mechanism) if "dimension" in f.metadata)
 
 
-def geometry_values(mechanism: Any) -> FloatArray:
-    """Return the geometry parameters of a mechanism in declaration order (g,) [SI]."""
-    return np.array([getattr(mechanism, f.name) for f in geometry_parameters(mechanism)])
+class Dimensioned:
+    """What the dataclasses of the mechanisms share: their fields, checked and as arrays.
 
-
-def check_geometry(mechanism: Any) -> None:
-    """Check every geometry parameter by itself.
-
-    Raises:
-        GeometryError: If one is not finite, or is a length or ratio that is not positive.
+    Attributes:
+        joint_ranges: Pairs (lower, upper), one an actuated joint [rad or m].
+        passive_joint_ranges: The same of the passive joints, as excursions.
     """
-    for f in geometry_parameters(mechanism):
-        value = getattr(mechanism, f.name)
-        if not np.isfinite(value):
-            raise GeometryError(f"{f.name} ({f.metadata['symbol']}) must be finite, got {value}")
-        if f.metadata["positive"] and value <= 0.0:
-            unit = SI_UNITS[f.metadata["dimension"]]
-            raise GeometryError(
-                f"{f.name} ({f.metadata['symbol']}) must be > 0 [{unit}], got {value}"
-            )
+
+    joints: ClassVar[tuple[Joint, ...]]
+    passive_joints: ClassVar[tuple[Joint, ...]]
+    joint_ranges: tuple[tuple[float, float], ...]
+    passive_joint_ranges: tuple[tuple[float, float], ...]
+
+    def check_fields(self) -> None:
+        """Check every field by itself.
+
+        Raises:
+            GeometryError: If a parameter is not finite, or not positive although it must be, or a
+                range is reversed, NaN or missing.
+        """
+        for f in geometry_parameters(self):
+            value = getattr(self, f.name)
+            if not np.isfinite(value):
+                raise GeometryError(
+                    f"{f.name} ({f.metadata['symbol']}) must be finite, got {value}"
+                )
+            if f.metadata["positive"] and value <= 0.0:
+                unit = SI_UNITS[f.metadata["dimension"]]
+                raise GeometryError(
+                    f"{f.name} ({f.metadata['symbol']}) must be > 0 [{unit}], got {value}"
+                )
+        _check_ranges("joint_ranges", self.joint_ranges, self.joints)
+        _check_ranges("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+
+    @cached_property
+    def joint_limits(self) -> FloatArray:
+        """Ranges of the actuated joints (n, 2) [rad or m]."""
+        return np.array(self.joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def passive_joint_limits(self) -> FloatArray:
+        """Ranges of the passive joints as excursions from the initial posture (p, 2) [rad or m]."""
+        return np.array(self.passive_joint_ranges, dtype=np.float64)
+
+    @cached_property
+    def _geometry(self) -> FloatArray:
+        """Geometry parameters in the order of declaration (g,) [SI]."""
+        return np.array([getattr(self, f.name) for f in geometry_parameters(self)])
 
 
-def check_limits(name: str, limits: Any, joints: Sequence[Joint]) -> FloatArray:
-    """Return joint ranges as an array (len(joints), 2).
-
-    Args:
-        name: Name of the field for the error message.
-        limits: Pairs (lower, upper), one a joint, with lower ≤ upper.
-        joints: The joints they belong to.
-
-    Raises:
-        GeometryError: If the number of pairs differs, or a pair is reversed or NaN.
-    """
-    array = np.asarray(limits, dtype=np.float64)
+def _check_ranges(name: str, ranges: Any, joints: Sequence[Joint]) -> None:
+    array = np.asarray(ranges, dtype=np.float64)
     if array.shape != (len(joints), 2):
         raise GeometryError(
             f"{name} must be {len(joints)} pairs (lower, upper), got shape {array.shape}"
@@ -204,7 +224,25 @@ def check_limits(name: str, limits: Any, joints: Sequence[Joint]) -> FloatArray:
             raise GeometryError(
                 f"{name} of {joint.name}: lower {lower} must be <= upper {upper} [{joint.unit}]"
             )
-    return array
+
+
+def flipped_modes(default: str, parts: Sequence[str]) -> tuple[str, ...]:
+    """Return the default mode and one for each set of parts assembled the other way round."""
+    flips = [
+        "+".join(part for part, flip in zip(parts, bits, strict=True) if flip)
+        for bits in product((False, True), repeat=len(parts))
+    ]
+    return (default, *(f"flipped_{name}" for name in flips[1:]))
+
+
+def mode_signs(mechanism: Mechanism, assembly_mode: str, parts: Sequence[str]) -> FloatArray:
+    """Return -1 for each part (parts,) that a mode of `flipped_modes` flips, +1 for the others.
+
+    Raises:
+        UnknownNameError: If the mechanism has no such mode.
+    """
+    index, last = mode_index(mechanism, assembly_mode), len(parts) - 1
+    return np.array([-1.0 if index >> (last - k) & 1 else 1.0 for k in range(last + 1)])
 
 
 def mode_index(mechanism: Mechanism, assembly_mode: str) -> int:

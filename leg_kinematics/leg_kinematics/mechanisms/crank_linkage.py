@@ -26,12 +26,10 @@ from leg_kinematics.dyads import Point
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.kernel import Kernel, kernel, scalar
 from leg_kinematics.mechanism import (
+    Dimensioned,
     Joint,
     Linkage,
     Posture,
-    check_geometry,
-    check_limits,
-    geometry_values,
     mode_index,
 )
 from leg_kinematics.scalars import LIMIT_TOLERANCE, within
@@ -201,22 +199,13 @@ def _near_brackets(curve, x, y, shape, lower, upper):  # type: ignore[no-untyped
 # --------------------------------------------------------------------------- mechanism
 
 
-def flipped_modes(default: str, parts: Sequence[str]) -> tuple[str, ...]:
-    """Return the default mode and one for each set of parts assembled the other way round."""
-    flips = [
-        "+".join(part for part, flip in zip(parts, bits, strict=True) if flip)
-        for bits in product((False, True), repeat=len(parts))
-    ]
-    return (default, *(f"flipped_{name}" for name in flips[1:]))
-
-
 def mode_sides(walking: Sequence[float]) -> FloatArray:
     """Return the sides of every mode of `flipped_modes` (modes, parts)."""
     flips = product((1.0, -1.0), repeat=len(walking))
     return np.array(list(flips), dtype=np.float64) * np.asarray(walking)
 
 
-class CrankLinkage:
+class CrankLinkage(Dimensioned):
     """Base of the mechanisms with one crank; a subclass is a frozen dataclass of its geometry.
 
     A range of a joint that spans a whole turn or more does not limit it: the joint turns endlessly,
@@ -250,9 +239,7 @@ class CrankLinkage:
 
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the posture with the crank at zero."""
-        check_geometry(self)
-        check_limits("joint_ranges", self.joint_ranges, self.joints)
-        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        self.check_fields()
         for triangle in self.triangles:
             a, b, c = sorted(getattr(self, field) for field in triangle.sides)
             if a + b < c * (1.0 - 1e-9):
@@ -283,16 +270,6 @@ class CrankLinkage:
         raise GeometryError("the lengths are too large or too small to compute with")
 
     @cached_property
-    def joint_limits(self) -> FloatArray:
-        """Range of the crank about its zero (1, 2) [rad]; a whole turn is no limit."""
-        return np.array(self.joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints as excursions from the initial posture (p, 2) [rad]."""
-        return np.array(self.passive_joint_ranges, dtype=np.float64)
-
-    @cached_property
     def initial_posture(self) -> Posture:
         """The posture with the crank at zero."""
         return self.forward(np.zeros(1))
@@ -300,7 +277,7 @@ class CrankLinkage:
     @cached_property
     def _constants(self) -> FloatArray:
         constants: FloatArray = self.kernels.constants(
-            geometry_values(self), np.zeros(self.constants_size)
+            self._geometry, np.zeros(self.constants_size)
         )
         return constants
 

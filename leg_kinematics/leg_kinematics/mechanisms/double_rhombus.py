@@ -35,7 +35,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -46,13 +45,12 @@ from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.kernel import kernel, scalar
 from leg_kinematics.mechanism import (
+    Dimensioned,
     Joint,
     Linkage,
     Posture,
-    check_geometry,
-    check_limits,
-    geometry_values,
-    mode_index,
+    flipped_modes,
+    mode_signs,
     parameter,
 )
 from leg_kinematics.scalars import included_angle, swing_plane, within, wrapped
@@ -384,21 +382,12 @@ FLIPPABLE = ("rhombus", "upper", "lower")
 INITIAL_CLOSURE = (1.25 * math.pi, 1.75 * math.pi, 0.0)
 
 
-def _mode_names() -> tuple[str, ...]:
-    """Return "initial" and the 7 modes named after the signs that differ from it."""
-    flips = [
-        "+".join(name for name, flip in zip(FLIPPABLE, bits, strict=True) if flip)
-        for bits in product((False, True), repeat=len(FLIPPABLE))
-    ]
-    return ("initial", *(f"flipped_{name}" for name in flips[1:]))
-
-
 def _range_deg(lower: float, upper: float) -> tuple[float, float]:
     return math.radians(lower), math.radians(upper)
 
 
 @dataclass(frozen=True)
-class DoubleRhombus:
+class DoubleRhombus(Dimensioned):
     """The leg with double rhombus and three cylinders; defaults are the paper's dimensions.
 
     Joint positions are the lengths of the cylinders, pin to pin. The foot position is that of I in
@@ -427,7 +416,7 @@ class DoubleRhombus:
     closure_names: ClassVar[tuple[str, ...]] = (
         *("upper_crank_angle", "lower_crank_angle", "side_swing_angle"),
     )
-    assembly_modes: ClassVar[tuple[str, ...]] = _mode_names()
+    assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
     task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
 
@@ -467,24 +456,8 @@ class DoubleRhombus:
 
     def __post_init__(self) -> None:
         """Check the dimensions; the initial posture must be off every dead centre."""
-        check_geometry(self)
-        check_limits("joint_ranges", self.joint_ranges, self.joints)
-        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        self.check_fields()
         self._signs  # noqa: B018  raises GeometryError
-
-    @cached_property
-    def joint_limits(self) -> FloatArray:
-        """Shortest and longest cylinders (3, 2) [m]."""
-        return np.array(self.joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints as excursions from the initial posture (10, 2) [rad]."""
-        return np.array(self.passive_joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def _geometry(self) -> FloatArray:
-        return geometry_values(self)
 
     @cached_property
     def _signs(self) -> FloatArray:
@@ -512,9 +485,7 @@ class DoubleRhombus:
 
     def _branch(self, assembly_mode: str) -> FloatArray:
         """Return the branch signs of an assembly mode."""
-        index = mode_index(self, assembly_mode)
-        flips = [-1.0 if index >> (2 - k) & 1 else 1.0 for k in range(len(FLIPPABLE))]
-        return self._signs * [*flips, 1.0]
+        return self._signs * [*mode_signs(self, assembly_mode, FLIPPABLE), 1.0]
 
     def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
         return (

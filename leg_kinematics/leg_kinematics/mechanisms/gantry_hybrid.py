@@ -31,7 +31,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -42,13 +41,12 @@ from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.kernel import kernel, scalar
 from leg_kinematics.mechanism import (
+    Dimensioned,
     Joint,
     Linkage,
     Posture,
-    check_geometry,
-    check_limits,
-    geometry_values,
-    mode_index,
+    flipped_modes,
+    mode_signs,
     offset,
     parameter,
 )
@@ -446,21 +444,12 @@ def _levers(geometry, q, closure, shape, result):  # type: ignore[no-untyped-def
 FLIPPABLE = Branch._fields
 
 
-def _mode_names() -> tuple[str, ...]:
-    """Return "initial" and the 31 modes named after the signs that differ from it."""
-    flips = [
-        "+".join(name for name, flip in zip(FLIPPABLE, bits, strict=True) if flip)
-        for bits in product((False, True), repeat=len(FLIPPABLE))
-    ]
-    return ("initial", *(f"flipped_{name}" for name in flips[1:]))
-
-
 def _range_deg(lower: float, upper: float) -> tuple[float, float]:
     return math.radians(lower), math.radians(upper)
 
 
 @dataclass(frozen=True)
-class GantryHybrid:
+class GantryHybrid(Dimensioned):
     """The gantry manipulator; defaults are the dimensions of the paper's example.
 
     Joint positions are the displacements s1, s2, s3, s4 of the slides A, E, B, C. The "foot
@@ -482,7 +471,7 @@ class GantryHybrid:
         Joint("shaft_sleeve", "prismatic"),
     )
     closure_names: ClassVar[tuple[str, ...]] = ("platform_x", "platform_z", "platform_tilt")
-    assembly_modes: ClassVar[tuple[str, ...]] = _mode_names()
+    assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
     task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "beta")
     task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m", "rad")
 
@@ -511,9 +500,7 @@ class GantryHybrid:
 
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the posture with all slides at zero."""
-        check_geometry(self)
-        check_limits("joint_ranges", self.joint_ranges, self.joints)
-        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        self.check_fields()
         if not all(map(math.isfinite, self._initial_closure)):
             bars = "bar_a_length (L1), bar_b_length (L2), slide_a_start (b1), slide_b_start (b2)"
             rod = "rod_c_length (L3), slide_c_start (c), rail_c_forward (d), platform_arm (e)"
@@ -528,23 +515,9 @@ class GantryHybrid:
             )
 
     @cached_property
-    def joint_limits(self) -> FloatArray:
-        """Strokes of the slides (4, 2) [m]."""
-        return np.array(self.joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints as excursions from the initial posture (9, 2) [rad, m]."""
-        return np.array(self.passive_joint_ranges, dtype=np.float64)
-
-    @cached_property
     def auxiliary_chain(self) -> AuxiliaryChain:
         """The shaft that turns a tool on the platform."""
         return AuxiliaryChain(self.shaft_base_forward, self.shaft_platform_forward)
-
-    @cached_property
-    def _geometry(self) -> FloatArray:
-        return geometry_values(self)
 
     @cached_property
     def _initial_closure(self) -> FloatArray:
@@ -573,8 +546,7 @@ class GantryHybrid:
 
     def _branch(self, assembly_mode: str) -> FloatArray:
         """Return the branch signs of an assembly mode."""
-        index, last = mode_index(self, assembly_mode), len(FLIPPABLE) - 1
-        return self._signs * [-1.0 if index >> (last - k) & 1 else 1.0 for k in range(last + 1)]
+        return self._signs * mode_signs(self, assembly_mode, FLIPPABLE)
 
     def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
         return (

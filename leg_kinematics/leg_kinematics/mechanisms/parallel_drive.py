@@ -24,7 +24,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -35,13 +34,12 @@ from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.kernel import kernel, scalar
 from leg_kinematics.mechanism import (
+    Dimensioned,
     Joint,
     Linkage,
     Posture,
-    check_geometry,
-    check_limits,
-    geometry_values,
-    mode_index,
+    flipped_modes,
+    mode_signs,
     offset,
     parameter,
 )
@@ -651,17 +649,8 @@ PASSIVE_RANGE = math.radians(45.0)
 FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
 
 
-def _mode_names() -> tuple[str, ...]:
-    """Return "initial" and the 15 modes named after the bends that differ from it."""
-    flips = [
-        "+".join(name for name, flip in zip(FLIPPABLE, bits, strict=True) if flip)
-        for bits in product((False, True), repeat=len(FLIPPABLE))
-    ]
-    return ("initial", *(f"flipped_{name}" for name in flips[1:]))
-
-
 @dataclass(frozen=True)
-class ParallelDrive:
+class ParallelDrive(Dimensioned):
     """The parallel-driving leg; defaults are the paper's initial dimensions.
 
     The foot position is that of C in the leg frame {C}, whose origin is the hip H.
@@ -683,7 +672,7 @@ class ParallelDrive:
         *("platform_elevation", "platform_tilt"),
         *("thigh_angle", "link_angle", "swing_angle"),
     )
-    assembly_modes: ClassVar[tuple[str, ...]] = _mode_names()
+    assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
     task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
 
@@ -719,24 +708,8 @@ class ParallelDrive:
 
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the initial posture."""
-        check_geometry(self)
-        check_limits("joint_ranges", self.joint_ranges, self.joints)
-        check_limits("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        self.check_fields()
         self._initial  # noqa: B018  raises GeometryError
-
-    @cached_property
-    def joint_limits(self) -> FloatArray:
-        """Ranges of the cranks about their zero (3, 2) [rad]."""
-        return np.array(self.joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints as excursions from the initial posture (9, 2) [rad]."""
-        return np.array(self.passive_joint_ranges, dtype=np.float64)
-
-    @cached_property
-    def _geometry(self) -> FloatArray:
-        return geometry_values(self)
 
     @cached_property
     def _initial(self) -> tuple[FloatArray, FloatArray]:
@@ -796,12 +769,9 @@ class ParallelDrive:
 
     def _branch(self, assembly_mode: str) -> FloatArray:
         """Return the branch signs of an assembly mode."""
-        index = mode_index(self, assembly_mode)
-        flips = [name for k, name in enumerate(FLIPPABLE) if index >> (3 - k) & 1]
-        sign = {name: -1.0 if name in flips else 1.0 for name in FLIPPABLE}
+        knee, center, crank_1, crank_2 = mode_signs(self, assembly_mode, FLIPPABLE)
         # Flipping the platform's bend turns the platform over, and with it the loop's orientation.
-        flip = [sign["crank_1"], sign["crank_2"], sign["center"], sign["knee"], sign["center"]]
-        return self._initial[1] * flip
+        return self._initial[1] * [crank_1, crank_2, center, knee, center]
 
     def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
         return (

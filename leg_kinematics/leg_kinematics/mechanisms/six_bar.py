@@ -32,7 +32,7 @@ from leg_kinematics.dyads import (
     turning_rate,
 )
 from leg_kinematics.kernel import kernel, scalar
-from leg_kinematics.mechanism import Joint, parameter
+from leg_kinematics.mechanism import Joint, flipped_modes, parameter
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
     INVALID_INPUT,
@@ -44,7 +44,6 @@ from leg_kinematics.mechanisms.crank_linkage import (
     Triangle,
     approach,
     bracket_between,
-    flipped_modes,
     mode_sides,
     narrowed,
     side,
