@@ -30,7 +30,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.documents import (
@@ -225,6 +224,8 @@ def _leg(
         document.check(schema, "legs", name, "joint_names")
     mechanism: Any = Mirrored(original) if entry.get("mirrored", False) else original
     mount = entry["mount"]
+    from scipy.spatial.transform import Rotation  # slow to import, and only needed here
+
     rotation = Rotation.from_euler("xyz", np.array(mount["rpy"], float) * units["angle"])
     return Leg(
         name=name,

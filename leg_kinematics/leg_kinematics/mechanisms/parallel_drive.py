@@ -274,15 +274,20 @@ def newton(
 
 
 @scalar
+def platform_bend(g: Geometry, p: Pose) -> float:
+    """Return sin(a + delta3 - phi_3), of the bend from the centre crank to U3 -> S, times U3 S."""
+    along, across = g.l3 * p.cb * p.ca - g.l33 * p.sa, g.l3 * p.cb * p.sa + g.l33 * p.ca
+    return across * p.cp3 - along * p.sp3
+
+
+@scalar
 def drive_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
     """Tell whether the drive lies strictly inside the branch, off its singularities."""
     f1, f2 = gradients(g, p)
-    # sin of the angle from the centre crank to the platform's arm U3 -> S, times the arm
-    bend = (g.l3 * p.cb * p.sa + g.l33 * p.ca) * p.cp3 - (g.l3 * p.cb * p.ca - g.l33 * p.sa) * p.sp3
     return (
         f1.q * branch.crank_1 > 0.0
         and f2.q * branch.crank_2 > 0.0
-        and bend * branch.center > 0.0
+        and platform_bend(g, p) * branch.center > 0.0
         and (f1.a * f2.b - f1.b * f2.a) * branch.loop > 0.0
         and p.cb > 0.0
     )
@@ -622,6 +627,21 @@ def _jacobians(geometry, q, closure, jacobian, angular):
     fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
 
 
+@kernel("(g),(c),(b)->(c),(b)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
+def _initial_closure(geometry, shape, branch_shape, closure, signs):  # type: ignore[no-untyped-def]
+    """Closure and branch signs with all cranks at zero; NaN where a loop does not close."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    q = np.zeros(3)
+    closure[0], closure[1] = wrapped(elevation_guess(g, 0.0, 0.0)), 0.0
+    closure[2], closure[3], closure[4] = pantograph_of_drive(g, 1.0, 0.0, closure[0], closure[1])
+    p = pose_of_angles(g, q, closure)
+    f1, f2 = gradients(g, p)
+    signs[0], signs[1] = np.sign(f1.q), np.sign(f2.q)
+    signs[2] = np.sign(platform_bend(g, p))
+    signs[3] = np.sign(p.s2 * p.c1 - p.c2 * p.s1)
+    signs[4] = np.sign(f1.a * f2.b - f1.b * f2.a)
+
+
 @kernel("(g),(n),(c),(r)->(r)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
 def _passive_rest(geometry, q, closure, shape, rest):
     """What `passive_measures` compares with: three angles and three vectors in the platform."""
@@ -720,27 +740,19 @@ class ParallelDrive(Dimensioned):
                 f"rod_length (l1) = {g.l1} m does not span half the crank spacing less the "
                 f"platform arm, |d/2 - a| = {abs(0.5 * g.d - g.a)} m"
             )
-        a, b, q = elevation_guess(g, 0.0, 0.0), 0.0, np.zeros(3)
-        if math.isnan(a):
+        closure, signs = _initial_closure(self._geometry, np.zeros(5), np.zeros(5))
+        if math.isnan(closure[0]):
             raise GeometryError(
                 "with all cranks at zero the rods (l1), cranks (m1, m3) and platform (l3) do not "
                 "close a loop: change one of these lengths or the crank zeros (phi_1, phi_3)"
             )
-        a = wrapped(a)
-        th1, th2, th3 = pantograph_of_drive(g, 1.0, 0.0, a, b)
-        if math.isnan(th1):
+        if math.isnan(closure[2]):
             raise GeometryError(
                 f"with all cranks at zero the pantograph's thigh (l4 = {g.l4} m) and lever "
                 f"(c, l_g: {math.hypot(g.c, g.lg):.4f} m) do not join the hip H and the platform's "
                 "drive point S"
             )
-        closure = np.array([a, b, th1, th2, th3])
-        pose = pose_of_angles(g, q, closure)
-        f1, f2 = gradients(g, pose)
-        center = math.sin(a + math.atan2(g.l33, g.l3) - g.phi3)
-        knee = math.sin(th2 - th1)
-        signs = np.sign([f1.q, f2.q, center, knee, f1.a * f2.b - f1.b * f2.a])
-        if np.any(signs == 0.0) or knee < 0.0:
+        if np.any(signs == 0.0) or signs[3] < 0.0:
             raise GeometryError("the posture with all cranks at zero is singular")
         return closure, signs
 
@@ -773,14 +785,21 @@ class ParallelDrive(Dimensioned):
         # Flipping the platform's bend turns the platform over, and with it the loop's orientation.
         return self._initial[1] * [crank_1, crank_2, center, knee, center]
 
+    @cached_property
+    def _known_parameters(self) -> dict[str, tuple[FloatArray, ...]]:
+        return {}
+
     def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
-        return (
-            self._geometry,
-            self._branch(assembly_mode),
-            self._rest,
-            self.joint_limits,
-            self._passive_bounds,
-        )
+        """Return the arguments that the kernels share, kept for the next call."""
+        if assembly_mode not in self._known_parameters:
+            self._known_parameters[assembly_mode] = (
+                self._geometry,
+                self._branch(assembly_mode),
+                self._rest,
+                self.joint_limits,
+                self._passive_bounds,
+            )
+        return self._known_parameters[assembly_mode]
 
     @cached_property
     def initial_posture(self) -> Posture:
