@@ -8,7 +8,7 @@ PYTHON ?= $(or $(wildcard $(VENV_PYTHON)),python3)
 # Nodes talk on this machine only, and no ROS that the shell has sourced shows through.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export AMENT_PREFIX_PATH := $(VENV)
-unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint typecheck bench bench-compare papers clean

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating[Any]]
 
 Unit = Literal["s", "Hz", "x", "%", "B", "count"]
 
@@ -135,19 +137,43 @@ def measure(
     return summary(np.array(durations) / points)
 
 
-def measure_each(
-    function: Callable[[Any], Any], inputs: Sequence[Any], settings: Settings
-) -> Timing:
-    """Time a function that takes one point at a time, over all inputs in turn."""
+def measure_beside(
+    theirs: Callable[[Any], Any],
+    inputs: Sequence[Any] | FloatArray,
+    ours: Callable[[], Any],
+    points: int,
+    settings: Settings,
+) -> tuple[Timing, Timing]:
+    """Time a peer and the suite in turn, so that both meet the same disturbances.
+
+    Args:
+        theirs: The peer, which takes one point at a time.
+        inputs: The points it is given.
+        ours: The suite's function, warm.
+        points: Points that one call of `ours` handles.
+        settings: How often.
+
+    Returns:
+        Times per point of the peer and of the suite.
+    """
 
     def over_all() -> None:
         for item in inputs:
-            function(item)
+            theirs(item)
 
-    return measure(over_all, settings, len(inputs))
+    over_all()
+    loops = max(1, math.ceil(SHORTEST_RUN / max(_duration(ours, 1), 1e-9)))
+    deadline = time.perf_counter() + settings.budget
+    durations: list[tuple[float, float]] = []
+    while len(durations) < settings.repeats:
+        durations.append((_duration(over_all, 1), _duration(ours, loops) / loops))
+        if len(durations) >= FEWEST_RUNS and time.perf_counter() > deadline:
+            break
+    peer, suite = np.array(durations).T
+    return summary(peer / len(inputs)), summary(suite / points)
 
 
-def summary(durations: ArrayLike) -> Timing:
+def summary(durations: Sequence[float] | FloatArray) -> Timing:
     """Return median and p95 of durations."""
     median, p95 = np.percentile(durations, [50.0, 95.0])
     return Timing(float(median), float(p95))
@@ -165,11 +191,10 @@ def timed_row(what: str, timing: Timing, goal: Goal | None = None, note: str = "
     return Row(what, timing.median, "s", timing.p95, goal, note)
 
 
-def ratio_row(
-    what: str, theirs: Timing, ours: Timing, goal: Goal | None = None, note: str = ""
-) -> Row:
-    """Return how many times faster ours is."""
-    return Row(what, theirs.median / ours.median, "x", None, goal, note)
+def ratio_row(what: str, times: tuple[Timing, Timing], goal: Goal | None = None) -> Row:
+    """Return how many times longer a peer takes than the suite, from runs taken in turn."""
+    theirs, ours = times
+    return Row(what, theirs.median / ours.median, "x", goal=goal)
 
 
 def missing_row(what: str, reason: object) -> Row:

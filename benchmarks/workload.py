@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from leg_kinematics import Leg, Mechanism, Status, load_robot
+from leg_kinematics import Leg, Status, load_robot
 from leg_kinematics.arrays import FloatArray
 from leg_statics.footholds import Contact
 from leg_statics.maps import workspace_bounds
@@ -24,8 +24,7 @@ def hexapod_leg(name: str = "right_front") -> Leg:
     return load_robot("hexapod").legs[name]
 
 
-@lru_cache
-def reachable_positions(mechanism: Mechanism, count: int = BATCH) -> FloatArray:
+def reachable_positions(mechanism: Any, count: int = BATCH) -> FloatArray:
     """Return foot positions spread evenly over the workspace (count, 3) [m], always the same."""
     random = np.random.default_rng(SEED)
     lower, upper = workspace_bounds(mechanism).T

@@ -14,6 +14,7 @@ import rclpy
 from leg_msgs_py.arrays import to_field
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 from leg_kinematics import load_robot
@@ -27,7 +28,7 @@ TIMEOUT = 30.0  # to be listened to [s]
 def main() -> None:
     """Wait for a listener, warm up, send, and print what was done as JSON."""
     rate, seconds = map(float, sys.argv[1:3])
-    rclpy.init()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # a signal ends it at once
     node = Node("joint_state_sender", enable_rosout=False, start_parameter_services=False)
     publisher = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
     deadline = time.monotonic() + TIMEOUT

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from harness import Goal, Row, Settings, measure, measure_each, missing_row, ratio_row, timed_row
-from numpy.typing import NDArray
+from harness import Goal, Row, Settings, measure, measure_beside, missing_row, ratio_row, timed_row
 from peers.pinocchio_leg import PinocchioLeg
 from peers.solvers import Clarabel
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, neighbours, reachable_positions
@@ -42,7 +41,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     )
 
     try:
-        peer = Chain(leg.effort_limits, PinocchioLeg(mechanism))
+        peer = Chain(leg.effort_limits, PinocchioLeg(leg.geometry))
     except ImportError as error:
         yield missing_row("pinocchio + clarabel", error)
         return
@@ -54,19 +53,21 @@ def rows(settings: Settings) -> Iterator[Row]:
     wanted = evaluate_footholds(mechanism, leg.effort_limits, few, CONTACT)
     np.testing.assert_allclose(found[:, 0], wanted.load_capacity, rtol=1e-6)
     np.testing.assert_allclose(found[:, 1], wanted.rated_friction, rtol=1e-6, atol=1e-9)
-    theirs = measure_each(lambda task: peer.evaluate(*task), tasks, settings)
-    yield timed_row(
-        "pinocchio + clarabel", theirs, note="capacity and rated friction equal within 1e-6"
+    times = measure_beside(
+        lambda task: peer.evaluate(*task), tasks, lambda: evaluate(feet), BATCH, settings
     )
-    yield ratio_row("pinocchio + clarabel / evaluate_footholds", theirs, ours)
+    yield timed_row(
+        "pinocchio + clarabel", times[0], note="capacity and rated friction equal within 1e-6"
+    )
+    yield ratio_row("pinocchio + clarabel / evaluate_footholds", times)
 
 
 class Chain:
     """Pinocchio for the pose and its Jacobians, Clarabel for the capacity."""
 
-    def __init__(self, effort_limits: NDArray[np.float64], leg: PinocchioLeg) -> None:
+    def __init__(self, effort_limits: FloatArray, leg: PinocchioLeg) -> None:
         self.leg = leg
-        self._solver = Clarabel(*effort_limits.T, FRICTION)
+        self._solver = Clarabel(effort_limits[:, 0], effort_limits[:, 1], FRICTION)
 
     def evaluate(self, foot: FloatArray, start: FloatArray) -> tuple[float, float]:
         """Return load capacity and rated friction."""

@@ -41,7 +41,7 @@ def rows(settings: Settings) -> Iterator[Row]:
         ):
             timing = measure(function, settings, count)
             times.setdefault(name, []).append(timing)
-            yield timed_row(f"{name}, {count:,} points", timing, note="per point")
+            yield timed_row(f"{name}, N = {count:,}", timing, note="per point")
     draw(counts, times)
 
     once, many = settings.count(1_000_000, 100_000), settings.count(10_000_000, 1_000_000)

@@ -12,11 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from leg_kinematics import ParallelDrive, Posture
-
-FloatArray = NDArray[np.float64]
+from leg_kinematics.arrays import FloatArray
 
 TOLERANCE = 1e-10  # of the equations [m, m², rad]
 MOST_STEPS = 20
@@ -52,7 +50,7 @@ class PinocchioLeg:
         crank_3 = joint(0, about_x, 0.0, m.center_crank_forward, -m.center_crank_drop, "crank_3")
         platform = joint(crank_3, about_x, 0.0, m.center_crank_length, 0.0, "platform_elevation")
         platform = joint(platform, about_z, 0.0, 0.0, 0.0, "platform_tilt")
-        swing = joint(0, about_y, *self._hip, "swing")
+        swing = joint(0, about_y, 0.0, m.hip_forward, -m.hip_drop, "swing")
         thigh = joint(swing, about_x, 0.0, 0.0, 0.0, "thigh")
         link = joint(thigh, about_x, 0.0, m.thigh_upper, 0.0, "link")
         self._shank = shank = joint(link, about_x, 0.0, m.parallelogram_link, 0.0, "shank")

@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanisms.theo_jansen import TheoJansen
-
-FloatArray = NDArray[np.float64]
 
 POINTS = ("A", "D", "B", "C", "U", "L", "F", "G")
 
@@ -40,7 +36,7 @@ class PylinkageJansen:
             return FixedDyad(first, second, side, -angle, name=name)
 
         a = Ground(0.0, 0.0, name="A")
-        d = Ground(*map(float, start["D"]), name="D")
+        d = Ground(float(start["D"][0]), float(start["D"][1]), name="D")
         crank = Crank(a, 1.0, angular_velocity=2.0 * math.pi / steps, name="B")
         c = dyad("C", crank.output, d, m.lower_coupler, m.lower_rocker)
         u = dyad("U", crank.output, d, m.upper_coupler, m.upper_rocker)

@@ -10,10 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-FloatArray = NDArray[np.float64]
+from leg_kinematics.arrays import FloatArray
 
 SIDES = 32  # of the friction pyramid
 # A pyramid about the cone of mu lies within the cone of mu times this.
