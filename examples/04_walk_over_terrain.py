@@ -5,7 +5,8 @@ Start the nodes with `make run`; then, in another terminal:
     .venv/bin/python examples/04_walk_over_terrain.py
 
 How it chooses is told in tripod_gait.py. Parameters, such as `--ros-args -p distance:=2.0`:
-`terrain` (YAML file), `distance` [m], `mass` [kg], `robot` (namespace of its nodes), `pause` [s].
+`terrain` (YAML file), `distance` [m], `mass` [kg], `robot` (namespace of its nodes), `pause`
+between half steps [s], `patience` while the nodes start [s].
 It publishes after every half step, in the frame `map`:
 ~/footholds (geometry_msgs/PoseArray), ~/step_length (std_msgs/Float64), ~/plan (MarkerArray).
 """
@@ -25,6 +26,7 @@ import rclpy
 from geometry_msgs.msg import Point, Pose, PoseArray, Vector3
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.errors import LegServiceError, ServerUnavailableError
+from rcl_interfaces.msg import ParameterDescriptor  # type: ignore[import-untyped]
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -33,11 +35,10 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import ColorRGBA, Float64, Header
 from terrain import Terrain, load_terrain
-from tripod_gait import TRIPODS, Gait, HalfStep, NoFootholdsError, TripodPlanner
+from tripod_gait import COLOURS, TRIPODS, Gait, HalfStep, NoFootholdsError, TripodPlanner
 from visualization_msgs.msg import Marker, MarkerArray
-from walk_pictures import COLOURS, plot_steps, plot_terrain
 
-from leg_kinematics.errors import DescriptionError
+from leg_kinematics.errors import DescriptionError, ValueRangeError
 
 MAP = "map"
 TERRAIN = Path(__file__).resolve().with_name("terrain.yaml")
@@ -58,12 +59,13 @@ class TerrainWalker(Node):
     def __init__(self) -> None:
         super().__init__("walker")
         source = self.declare_parameter("terrain", str(TERRAIN)).value
-        self.distance = float(self.declare_parameter("distance", 3.0).value)
-        self.gait = Gait(mass=float(self.declare_parameter("mass", Gait.mass).value))
         robot = self.declare_parameter("robot", "").value
-        pause = float(self.declare_parameter("pause", 0.0).value)
+        self.distance = self._number("distance", 3.0)
+        self.gait = Gait(mass=self._number("mass", Gait.mass))
+        pause, patience = self._number("pause", 0.0), self._number("patience", 5.0)
         self.terrain: Terrain = load_terrain(source)
-        self.client = LegClient(namespace=robot, timeout=5.0)
+        self.client = LegClient(namespace=robot)
+        self.client.wait_until_ready(patience)
         self.planner = TripodPlanner(self.client, self.terrain, self.gait, self.distance)
         self.state = self.planner.start()
         self.half_steps: list[HalfStep] = []
@@ -73,6 +75,18 @@ class TerrainWalker(Node):
         self._step_length = self.create_publisher(Float64, "~/step_length", KEPT)
         self._plan = self.create_publisher(MarkerArray, "~/plan", LATCHED)
         self._timer = self.create_timer(pause, self.advance)
+
+    def _number(self, name: str, default: float) -> float:
+        """Return a new parameter; a whole number needs no decimal point.
+
+        Raises:
+            ValueRangeError: If it is not a finite number >= 0.
+        """
+        anything = ParameterDescriptor(dynamic_typing=True)
+        value = self.declare_parameter(name, default, anything).value
+        if type(value) not in (int, float) or not 0.0 <= value < float("inf"):
+            raise ValueRangeError(f"parameter {name}: got {value!r}; allowed: a number >= 0")
+        return float(value)
 
     def advance(self) -> None:
         """Plan a half step and publish it; the client has a thread of its own, so it may block."""
@@ -154,12 +168,14 @@ def write(walker: TerrainWalker, arguments: argparse.Namespace) -> None:
         arguments.json.write_text(json.dumps(walker.report(), indent=1))
     if not walker.half_steps:
         return
+    from walk_pictures import plot_steps, plot_terrain  # late, because it takes a second
+
     arguments.output.mkdir(parents=True, exist_ok=True)
     for name, figure in (
         ("walk_terrain.png", plot_terrain(walker.terrain, walker.half_steps)),
         ("walk_steps.png", plot_steps(walker.half_steps, walker.gait.required_load)),
     ):
-        figure.savefig(arguments.output / name, dpi=200)
+        figure.savefig(arguments.output / name, dpi=200, bbox_inches="tight")
         print(f"wrote {arguments.output / name}")
 
 
@@ -191,7 +207,7 @@ def main() -> int:
         return 0
     except ServerUnavailableError as error:
         print(f"{error}\nStart the nodes first: make run", file=sys.stderr)
-    except (DescriptionError, NoFootholdsError, LegServiceError) as error:
+    except (DescriptionError, ValueRangeError, NoFootholdsError, LegServiceError) as error:
         print(error, file=sys.stderr)
     finally:
         if walker is not None:

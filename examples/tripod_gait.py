@@ -37,6 +37,15 @@ TRIPODS = (
     ("left_front", "left_rear", "right_middle"),
     ("right_front", "right_rear", "left_middle"),
 )
+# Of pictures and markers, from Okabe and Ito's palette, which colour-blind readers can tell apart.
+COLOURS = {
+    "left_front": "#0072B2",
+    "left_middle": "#009E73",
+    "left_rear": "#56B4E9",
+    "right_front": "#D55E00",
+    "right_middle": "#CC79A7",
+    "right_rear": "#E69F00",
+}
 GRAVITY = 9.81  # m/s^2
 INSTANTS = np.array([0.0, 0.5, 1.0])  # of a stance: touchdown, halfway, lift-off
 FRACTIONS = (1.0, 0.75, 0.5, 0.25)  # of the longest step that are tried
@@ -50,7 +59,7 @@ VERDICTS = {
         *("FRICTION", "EFFORT"),
     )
 }
-EDGE, CROWDED, SMOOTH = "edge", "near a foot", "rated friction"
+EDGE, CROWDED, SMOOTH = "edge", "near a foot", "mu_e > mu"
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,7 @@ class Gait:
     longest_step: float = 0.26
     shortest_step: float = 0.02
     step_reserve: float = 0.9
-    heights: tuple[float, ...] = (0.58, 0.62, 0.66, 0.70)
+    heights: tuple[float, ...] = (0.60, 0.65, 0.70)
     height_change: float = 0.06
     ahead: float = 0.12
     aside: float = 0.09

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,17 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch as Swatch
 from matplotlib.patches import Rectangle
 from terrain import Patch, Terrain
-from tripod_gait import TRIPODS, HalfStep
+from tripod_gait import COLOURS, TRIPODS, HalfStep
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart; legs differ in marker, too.
-COLOURS = {
-    "left_front": "#0072B2",
-    "left_middle": "#009E73",
-    "left_rear": "#56B4E9",
-    "right_front": "#D55E00",
-    "right_middle": "#CC79A7",
-    "right_rear": "#E69F00",
-}
 MARKERS = {
     "left_front": "^",
     "left_middle": "o",
@@ -66,7 +58,12 @@ def plot_terrain(terrain: Terrain, half_steps: Sequence[HalfStep]) -> Figure:
             [f.position for step in half_steps for f in step.footholds if f.leg == leg]
         )
         if len(places):
-            style = {"marker": MARKERS[leg], "color": colour, "mec": "black", "mew": 0.4}
+            style: dict[str, Any] = {
+                "marker": MARKERS[leg],
+                "color": colour,
+                "mec": "black",
+                "mew": 0.4,
+            }
             ax.plot(*places[:, :2].T, linestyle=":", linewidth=0.8, markersize=6, zorder=4, **style)
     ax.set_aspect("equal")
     ax.set_xlabel("x [m], walking direction", fontsize=SMALL + 1)
@@ -159,10 +156,10 @@ def _draw_patch(ax: Axes, patch: Patch, level: float) -> None:
         Rectangle(corner, *size, facecolor=face, edgecolor="0.35", hatch=hatch, lw=0.6, zorder=1)
     )
     height = "" if patch.height == 0 else f"\n{1e3 * patch.height:+.0f} mm".replace("-", "−")
-    above = np.mean(patch.y) >= 0.0
+    above = sum(patch.y) >= 0.0
     ax.annotate(
         f"{patch.name.replace('_', ' ')}{height}",
-        (np.mean(patch.x), patch.y[1] if above else patch.y[0]),
+        (sum(patch.x) / 2.0, patch.y[1] if above else patch.y[0]),
         xytext=(0, 3 if above else -3),
         textcoords="offset points",
         ha="center",
@@ -172,7 +169,12 @@ def _draw_patch(ax: Axes, patch: Patch, level: float) -> None:
 
 
 def _leg_handle(leg: str) -> Line2D:
-    style = {"marker": MARKERS[leg], "color": COLOURS[leg], "mec": "black", "mew": 0.4}
+    style: dict[str, Any] = {
+        "marker": MARKERS[leg],
+        "color": COLOURS[leg],
+        "mec": "black",
+        "mew": 0.4,
+    }
     return Line2D([], [], linestyle="", markersize=5, label=leg.replace("_", " "), **style)
 
 

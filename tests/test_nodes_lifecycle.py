@@ -408,13 +408,20 @@ def test_run_robot_refuses_a_robot_that_is_not_there():
     assert "Traceback" not in tool.stderr
 
 
-def test_the_demo_shows_everything_and_ends_well():
+def test_the_demo_shows_everything_and_ends_well(tmp_path):
     demo = subprocess.run(
-        [sys.executable, ROOT / "tools" / "demo.py"], capture_output=True, text=True, timeout=240.0
+        [sys.executable, ROOT / "tools" / "demo.py", "--output", tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=240.0,
     )
     assert demo.returncode == 0, demo.stdout + demo.stderr
-    for words in ("left_front", "UNREACHABLE", "hard ground", "soft ground", "UnknownLegError"):
+    for words in ("left_front", "out of reach", "soft ground", "UnknownLegError", "Arrived"):
         assert words in demo.stdout
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("map_load_capacity.png", "map_rated_friction.png"),
+        *("walk.json", "walk_steps.png", "walk_terrain.png"),
+    }
 
 
 def test_the_launch_file_is_valid_and_starts_the_same_nodes():

@@ -29,7 +29,7 @@ class Stream:
             node.create_subscription(LegStates, "/statics/leg_states", self.receive, 10),
             node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnose, 10),
         ]
-        wait_for(lambda: self.publisher.get_subscription_count() == 1)
+        wait_for(lambda: self.publisher.get_subscription_count() == 2)  # statics and maps
         wait_for(lambda: self.subscriptions[0].get_publisher_count() == 1)
         wait_for(lambda: self.ask(["left_front_crank_1"]) is None and self.diagnostics)
 

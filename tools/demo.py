@@ -27,12 +27,10 @@ from leg_msgs_py.client import LegClient  # noqa: E402
 from leg_msgs_py.errors import LegServiceError, ServerUnavailableError  # noqa: E402
 from leg_msgs_py.results import FloatArray, LegDescription  # noqa: E402
 from node_processes import NodeProcesses  # noqa: E402
+from rich.box import SIMPLE_HEAD  # noqa: E402
 from rich.console import Console  # noqa: E402
 from rich.markup import escape  # noqa: E402
 from rich.table import Table  # noqa: E402
-
-from leg_statics import plots  # noqa: E402
-from leg_statics.maps import CAPACITY_LAYER, IndexMap  # noqa: E402
 
 START_TIMEOUT = 180.0  # the first start on a machine compiles [s]
 WALK_TIMEOUT = 120.0  # s
@@ -44,8 +42,8 @@ OFFSETS = np.array(  # candidate footholds, from the initial foot position [m]
     [[0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.05, -0.2, 0.05], [0.0, 0.0, 0.15], [0.0, 0.0, -0.3]]
 )
 HEIGHTS = np.array([0.50, 0.55, 0.60, 0.65, 0.70, 0.75])  # of the body over the ground [m]
-WRAPPED = ("message of the node", "refused")  # columns of long texts
-MAP_HEIGHT, MAP_RESOLUTION = -0.65, 0.005  # m
+WRAPPED = ("message of the node",)  # columns of long texts
+MAP_HEIGHTS, MAP_RESOLUTION = (-0.7, -0.65, -0.6), 0.005  # m
 VERDICTS = {
     FootholdVerdict.FEASIBLE: "[green]feasible[/green]",
     FootholdVerdict.REACH: "[yellow]out of reach[/yellow]",
@@ -72,15 +70,14 @@ def main() -> int:
     with tempfile.TemporaryFile() as log:
         nodes = NodeProcesses("hexapod", stdout=log, stderr=subprocess.STDOUT)
         try:
-            with nodes, LegClient(timeout=20.0) as client:
+            output.mkdir(parents=True, exist_ok=True)
+            with nodes, walking(output, log) as walker, LegClient(timeout=20.0) as client:
                 wait_until_ready(client, nodes)
-                output.mkdir(parents=True, exist_ok=True)
-                with walking(output, log) as walker:  # plans while the tables are shown
-                    tour(client)
-                    draw_maps(client, output)
-                    with console.status("The planner walks ..."):
-                        code = walker.wait(WALK_TIMEOUT)
-                arrived = show_walk(output / "walk.json")
+                tour(client)
+                draw_maps(client, output)
+                with console.status("The planner walks ..."):
+                    code = walker.wait(WALK_TIMEOUT)
+            arrived = show_walk(output / "walk.json")
             show_pictures(output)
             if code == 0 and arrived:
                 return 0
@@ -96,13 +93,16 @@ def main() -> int:
 
 @contextmanager
 def walking(output: Path, log: Any) -> Iterator[subprocess.Popen[bytes]]:
-    """Run the planner node of the examples as a process; it ends with the block."""
+    """Run the planner node of the examples as a process; it ends with the block.
+
+    It waits for the nodes and plans while the tables are shown.
+    """
     plan = output / "walk.json"
     plan.unlink(missing_ok=True)
     walker = subprocess.Popen(
         [
             *(sys.executable, WALKER, "--output", output, "--json", plan),
-            *("--ros-args", "-p", f"distance:={DISTANCE}"),
+            *("--ros-args", "-p", f"distance:={DISTANCE}", "-p", f"patience:={START_TIMEOUT}"),
         ],
         stdout=log,
         stderr=subprocess.STDOUT,
@@ -129,6 +129,8 @@ def wait_until_ready(client: LegClient, nodes: NodeProcesses) -> None:
                 client.wait_until_ready(timeout=1.0)
                 break
             except ServerUnavailableError:
+                for name, code in nodes.ended().items():
+                    console.print(f"[red]{name} ended by itself with exit code {code}.[/red]")
                 if nodes.ended() or time.monotonic() - started > START_TIMEOUT:
                     raise
     seconds = time.monotonic() - started
@@ -155,7 +157,7 @@ def show_footholds(client: LegClient, leg: LegDescription) -> None:
     """Show what a leg can carry at candidate footholds, on each ground."""
     feet = leg.initial_foot_position + OFFSETS
     title = f"query_footholds: can {leg.leg} bear {LOAD:g} N there?"
-    columns = ("foothold [m]", "capacity", "mu_e", "effort used", "limiting joint", "verdict")
+    columns = ("foothold [m]", "capacity [N]", "mu_e", "effort used", "limiting joint", "verdict")
     table = new_table(title, "ground", *columns)
     for ground in GROUNDS:
         answer = client.query_footholds(leg.leg, feet, ground, LOAD)
@@ -164,7 +166,7 @@ def show_footholds(client: LegClient, leg: LegDescription) -> None:
             table.add_row(
                 f"{ground}, mu {answer.friction_coefficient:g}" if k == 0 else "",
                 vector(foot),
-                f"{number(answer.load_capacity[k], 0)} N",
+                number(answer.load_capacity[k], 0),
                 number(answer.rated_friction[k], 2),
                 f"{100 * answer.utilisation[k]:.0f} %" if joint >= 0 else "-",
                 leg.joint_names[joint].removeprefix(f"{leg.leg}_") if joint >= 0 else "-",
@@ -233,24 +235,30 @@ def show_refusals(client: LegClient, leg: LegDescription) -> None:
 
 def draw_maps(client: LegClient, output: Path) -> None:
     """Ask the maps node for planes of one leg's workspace and draw them."""
-    maps = {}
-    for ground in GROUNDS:
-        layers = (CAPACITY_LAYER, "rated_friction")
-        answer = client.index_map("right_front", MAP_HEIGHT, MAP_RESOLUTION, layers, ground)
-        maps[ground] = IndexMap(
-            answer.x,
-            answer.y,
-            np.array([answer.height]),
-            answer.layers,
-            answer.values[None],
-            answer.status[None],
-        )
-    where = f"right front leg at {plots.height_title(MAP_HEIGHT)}"
-    plots.plot_maps(maps, CAPACITY_LAYER, title=where).savefig(
-        output / "map_load_capacity.png", dpi=200
-    )
-    cement = {where: maps["cement"]}
-    plots.plot_maps(cement, "rated_friction").savefig(output / "map_rated_friction.png", dpi=200)
+    # Imported here, while the planner walks: it takes seconds.
+    from leg_statics import plots
+    from leg_statics.maps import CAPACITY_LAYER, IndexMap
+
+    def plane(height: float, layer: str, ground: str) -> IndexMap:
+        answer = client.index_map("right_front", height, MAP_RESOLUTION, [layer], ground)
+        z, values, status = np.array([answer.height]), answer.values[None], answer.status[None]
+        return IndexMap(answer.x, answer.y, z, answer.layers, values, status)
+
+    middle = MAP_HEIGHTS[len(MAP_HEIGHTS) // 2]
+    capacity = {ground: plane(middle, CAPACITY_LAYER, ground) for ground in GROUNDS}
+    friction = {
+        plots.height_title(height): plane(height, "rated_friction", GROUNDS[0])
+        for height in MAP_HEIGHTS
+    }
+    title = f"right front leg, {plots.height_title(middle)}"
+    for figure, name in (
+        (plots.plot_maps(capacity, CAPACITY_LAYER, title=title), "map_load_capacity.png"),
+        (
+            plots.plot_maps(friction, "rated_friction", title="right front leg"),
+            "map_rated_friction.png",
+        ),
+    ):
+        figure.savefig(output / name, dpi=200)
 
 
 def show_walk(plan: Path) -> bool:
@@ -262,22 +270,24 @@ def show_walk(plan: Path) -> bool:
         f"tripod walk over boards, ice, a pit and a kerb: {walk['mass']:g} kg, "
         f"each foot must bear {walk['required_load']:.0f} N"
     )
-    columns = ("body x, y", "height", "step (allowed) [m]", "feet on", "capacity", "mu_e / mu")
-    table = new_table(title, "", *columns, "refused")
+    columns = ("x, y [m]", "height", "step [m]", "allowed", "feet on", "capacity", "mu_e / mu")
+    table = new_table(title, "", *columns, "refused for")
     for k, step in enumerate(walk["half_steps"], start=1):
         x, y, _ = step["body_end"]
         feet = step["footholds"]
         tightest = max(feet, key=lambda foot: foot["rated_friction"] / foot["friction"])
+        grounds = Counter(foot["ground"] for foot in feet)
         refused = Counter(step["rejected"]).most_common(2)
         table.add_row(
             str(k),
             f"{x:.2f} {y:5.2f}",
             f"{step['body_height']:.2f}",
-            f"{step['step_length']:.3f} ({step['allowed_step']:.2f} {step['ground']})",
-            " ".join(foot["ground"] for foot in feet),
+            f"{step['step_length']:.3f}",
+            f"{step['allowed_step']:.2f} {step['ground']}",
+            ", ".join(f"{n} {ground}" for ground, n in grounds.most_common()),
             f"{min(foot['load_capacity'] for foot in feet):.0f} N",
             f"{tightest['rated_friction']:.2f} / {tightest['friction']:g}",
-            ", ".join(f"{count} {reason}" for reason, count in refused),
+            ", ".join(reason for reason, _ in refused),
         )
     console.print(table)
     steps = walk["half_steps"]
@@ -300,7 +310,13 @@ def show_pictures(output: Path) -> None:
 
 def new_table(title: str, *columns: str) -> Table:
     """Return a table; units in brackets are text, not markup."""
-    table = Table(title=escape(title), title_justify="left")
+    table = Table(
+        title=escape(title),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )
     for column in columns:
         table.add_column(escape(column), no_wrap=column not in WRAPPED)
     return table

@@ -270,7 +270,7 @@ class Caller:
             call.forget()
             call.future.settle(error=CancelledError("the client was closed"))
         if self._background:
-            self._background.close()
+            self._background.close(self._actions.values())
             return
         for client in self._clients.values():
             self.node.destroy_client(client)
@@ -353,10 +353,12 @@ class _BackgroundNode:
             except Exception as error:  # one bad message must not end the client
                 self.node.get_logger().error(f"{type(error).__name__}: {error}")
 
-    def close(self) -> None:
+    def close(self, actions: Iterable[Any]) -> None:
         self._stopping = True
         self._executor.create_task(lambda: None)  # `wake` alone does not make spin_once return
         self._thread.join()
         self._executor.shutdown()
+        for action in actions:  # the node does not know them
+            action.destroy()
         self.node.destroy_node()
         rclpy.shutdown(context=self.context)

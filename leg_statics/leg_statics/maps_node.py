@@ -74,7 +74,14 @@ class MapsNode(RobotNode):
         self._drawn_at = -np.inf
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
-        self.serve(GetIndexMap, "get_index_map", self.get_index_map)
+        self._goal_timer = self.create_timer(FEEDBACK_PERIOD, self._attend_goals)
+        self._goal_timer.cancel()
+        self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
+        self.create_subscription(
+            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
+        )
+        self.add_post_set_parameters_callback(lambda parameters: self._draw())
+        self.robot_changed()
         self._action = ActionServer(
             self,
             ComputeIndexMap,
@@ -84,14 +91,7 @@ class MapsNode(RobotNode):
             cancel_callback=self._cancel_goal,
             result_timeout=RESULT_TIMEOUT,
         )
-        self._goal_timer = self.create_timer(FEEDBACK_PERIOD, self._attend_goals)
-        self._goal_timer.cancel()
-        self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
-        self.create_subscription(
-            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
-        )
-        self.add_post_set_parameters_callback(lambda parameters: self._draw())
-        self.robot_changed()
+        self.serve(GetIndexMap, "get_index_map", self.get_index_map)
         self.announce()
 
     def _declare_parameters(self) -> None:

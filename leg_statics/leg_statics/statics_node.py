@@ -69,6 +69,10 @@ class StaticsNode(RobotNode):
         self._published_at: dict[tuple[str, ...], float] = {}
         self._limits_publisher = self.create_publisher(EffortLimits, "~/effort_limits", LATCHED)
         self._states_publisher = self.create_publisher(LegStates, "~/leg_states", 10)
+        self.robot_changed()
+        self.create_subscription(
+            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
+        )
         self.serve(ComputeEfforts, "compute_efforts", self.compute_efforts)
         self.serve(EvaluateIndices, "evaluate_indices", self.evaluate_indices)
         self.serve(
@@ -77,10 +81,6 @@ class StaticsNode(RobotNode):
         self.serve(QueryFootholds, "query_footholds", self.query_footholds)
         self.serve(QueryStepLength, "query_step_length", self.query_step_length)
         self.serve(SetEffortLimits, "set_effort_limits", self.set_effort_limits, self._fill_limits)
-        self.robot_changed()
-        self.create_subscription(
-            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
-        )
         self.announce()
 
     def warm_up(self, robot: Robot) -> None:
@@ -108,12 +108,7 @@ class StaticsNode(RobotNode):
 
     def compute_efforts(self, request: Any, response: Any) -> None:
         """Fill the joint efforts that hold ground reactions."""
-        leg = self.robot.leg(request.leg)
-        if leg.mechanism.task_coordinates != AXES:
-            raise NotSupportedError(
-                f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
-                f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"
-            )
+        leg = self._standing_leg(request.leg)
         frame = find_frame(self.robot, leg, request.header.frame_id)
         posture = self._posture(leg, request)
         count = len(posture.status)
@@ -148,7 +143,7 @@ class StaticsNode(RobotNode):
 
     def query_footholds(self, request: Any, response: Any) -> None:
         """Fill what the leg can carry at candidate footholds."""
-        leg = self.robot.leg(request.leg)
+        leg = self._standing_leg(request.leg)
         frame = find_frame(self.robot, leg, request.header.frame_id)
         contact = read_contact(self._grounds, request, frame)
         contact = contact._replace(bias=read_bias(leg, request.bias_efforts))
@@ -198,6 +193,20 @@ class StaticsNode(RobotNode):
 
     def _fill_limits(self, response: Any) -> None:
         response.limits = self._limits
+
+    def _standing_leg(self, name: str) -> Leg:
+        """Return a leg by its name.
+
+        Raises:
+            NotSupportedError: If it does not end in a foot that the ground could push.
+        """
+        leg = self.robot.leg(name)
+        if leg.mechanism.task_coordinates != AXES:
+            raise NotSupportedError(
+                f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
+                f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"
+            )
+        return leg
 
     def _posture(self, leg: Leg, request: Any) -> Posture:
         """Return the postures at the foot positions of a request."""

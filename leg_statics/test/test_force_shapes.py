@@ -1,0 +1,38 @@
+"""Shapes of forces, checked against the load capacity."""
+
+import numpy as np
+
+from leg_statics.capacity import load_capacity
+from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
+
+JACOBIAN = np.array([[0.3, -0.1, 0.05], [0.02, 0.25, -0.2], [-0.1, 0.05, 0.4]])
+LIMITS = np.array([[-100.0, 150.0], [-80.0, 80.0], [-60.0, 120.0]])
+
+
+def test_every_corner_of_the_polytope_uses_every_joint_to_a_limit():
+    efforts = -force_polytope(JACOBIAN, LIMITS) @ JACOBIAN
+    assert np.isclose(efforts[..., None], LIMITS).any(axis=-1).all()
+    assert len(np.unique(np.round(efforts, 6), axis=0)) == 8
+
+
+def test_the_highest_corner_is_the_capacity_without_friction_limit():
+    capacity = load_capacity(JACOBIAN, LIMITS[:, 0], LIMITS[:, 1], np.inf).capacity
+    np.testing.assert_allclose(force_polytope(JACOBIAN, LIMITS)[:, 2].max(), capacity)
+
+
+def test_twelve_edges_join_eight_corners():
+    assert len(EDGES) == 12
+    assert np.bincount(np.ravel(EDGES)).tolist() == [3] * 8
+
+
+def test_there_is_no_polytope_at_a_singularity():
+    assert np.isnan(force_polytope(np.diag([1.0, 1.0, 0.0]), LIMITS)).all()
+
+
+def test_the_rim_of_the_cone_is_where_the_foot_begins_to_slip():
+    normal = np.array([0.3, -0.4, 2.0])
+    n = normal / np.linalg.norm(normal)
+    rim = friction_cone(0.6, normal)
+    np.testing.assert_allclose(rim @ n, 1.0)
+    np.testing.assert_allclose(np.linalg.norm(rim - n, axis=-1), 0.6)
+    np.testing.assert_allclose(rim.mean(axis=0), n)
