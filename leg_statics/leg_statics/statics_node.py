@@ -92,7 +92,6 @@ class StaticsNode(RobotNode):
             evaluate_indices(leg.mechanism, posture)
             if leg.mechanism.task_coordinates == AXES:
                 load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
-            if len(leg.mechanism.task_coordinates) == len(AXES):
                 feet = np.tile(posture.foot_position, (2, 1))
                 contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
                 evaluate_footholds(leg.mechanism, leg.effort_limits, feet, contact).ranking()
