@@ -36,6 +36,7 @@ VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / "bin" / "python"
 STAMPS = VENV / "workspace.json"
 REQUIREMENTS = ROOT / "requirements.txt"
+DEMO_ROBOT = "hexapod"
 WHEEL_BUILD = ROOT / "tools" / "wheel_build.cmake"
 
 # The interpreter behind this one, when this one is the workspace's own.
@@ -55,7 +56,8 @@ def main() -> None:
         sources = {name: package_stamp(folder) for name, folder in find_packages().items()}
         changed = [name for name, stamp in sources.items() if stamps["packages"].get(name) != stamp]
         if changed:
-            build(changed)
+            with warm_kernels():
+                build(changed)
             write_stamps({**stamps, "packages": sources})
 
 
@@ -173,6 +175,24 @@ def build(packages: list[str]) -> None:
         progress=r"(?:Starting >>>|Finished <<<) .*",
     )
     link_modules()
+
+
+@contextlib.contextmanager
+def warm_kernels() -> Iterator[None]:
+    """Compile the mathematics meanwhile: it takes as long as the messages, on another core."""
+    sources = os.pathsep.join(str(ROOT / name) for name in ("leg_kinematics", "leg_statics"))
+    with (VENV / "log" / "kernels.log").open("w") as record:
+        process = subprocess.Popen(
+            [VENV_PYTHON, ROOT / "tools" / "warm_kernels.py", DEMO_ROBOT],
+            env={**build_environment(), "PYTHONPATH": sources},
+            stdout=record,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            yield
+            process.wait()  # what failed here fails again, and tells why, where it is used
+        finally:
+            process.kill()
 
 
 def link_modules() -> None:

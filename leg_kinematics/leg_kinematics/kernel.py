@@ -49,6 +49,9 @@ class Kernel:
     """A generalized ufunc that compiles, or loads its cached machine code, at its first call."""
 
     def __init__(self, function: Callable[..., None], layout: str, types: str) -> None:
+        # numba caches by path; linked and installed names of one file shall share what is compiled
+        path = os.path.realpath(function.__code__.co_filename)
+        function.__code__ = function.__code__.replace(co_filename=path)
         self.function = function
         self.layout = layout
         self.types = types

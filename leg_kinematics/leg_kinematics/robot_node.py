@@ -32,6 +32,7 @@ from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError
 from leg_kinematics.requests import error_code
 from leg_kinematics.robot import Robot
+from leg_kinematics.warm_up import warm_up_kinematics
 
 # The default depth of 10 loses requests when many clients ask at once.
 SERVICE_QOS = QoSProfile(depth=256)
@@ -128,11 +129,7 @@ class RobotNode(Node):
 
     def warm_up(self, robot: Robot) -> None:
         """Call what requests will call once, so that no request waits for a compiler."""
-        for mechanism in {leg.mechanism: None for leg in robot.legs.values()}:
-            posture = mechanism.inverse(mechanism.initial_posture.foot_position)
-            mechanism.jacobian(posture)
-            mechanism.angular_jacobian(posture)
-            mechanism.passive_joint_positions(posture)
+        warm_up_kinematics(robot)
 
     def robot_changed(self) -> None:
         """Take up a new robot description; `self.robot` is already the new one."""

@@ -29,8 +29,7 @@ from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.robot_node import RobotNode, run
 from leg_kinematics.status import Status
 from leg_statics.contacts import declare_grounds, read_ground
-from leg_statics.footholds import Contact, evaluate_footholds
-from leg_statics.indices import evaluate_indices
+from leg_statics.footholds import Contact
 from leg_statics.map_jobs import MapJob, MapKey, MapMemory
 from leg_statics.maps import IndexMap, find_layer, grid_shape, supported_layers
 from leg_statics.markers import (
@@ -40,6 +39,7 @@ from leg_statics.markers import (
     no_workspace_marker,
     workspace_marker,
 )
+from leg_statics.warm_up import warm_up_statics
 
 AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -128,12 +128,7 @@ class MapsNode(RobotNode):
     def warm_up(self, robot: Robot) -> None:
         """Call the kernels of the maps once, too."""
         super().warm_up(robot)
-        for leg in robot.legs.values():
-            if leg.mechanism.task_coordinates == AXES:
-                posture = leg.mechanism.initial_posture
-                evaluate_indices(leg.mechanism, posture)
-                contact = Contact(friction=0.4)
-                evaluate_footholds(leg.mechanism, leg.effort_limits, posture.foot_position, contact)
+        warm_up_statics(robot)
 
     def robot_changed(self) -> None:
         """Begin anew: all legs in their initial posture, with the limits in force."""

@@ -30,14 +30,14 @@ from leg_kinematics.requests import RequestError, check_count, find_frame, read_
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.robot_node import LOG_PERIOD, RobotNode, run
 from leg_kinematics.status import Status
-from leg_statics.capacity import load_capacity
 from leg_statics.contacts import declare_grounds, read_bias, read_contact
 from leg_statics.efforts import joint_efforts, utilisation
-from leg_statics.footholds import Contact, evaluate_footholds
+from leg_statics.footholds import evaluate_footholds
 from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
 from leg_statics.leg_state import leg_states
 from leg_statics.step_requests import fill_step_length
+from leg_statics.warm_up import warm_up_statics
 
 AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -86,15 +86,7 @@ class StaticsNode(RobotNode):
     def warm_up(self, robot: Robot) -> None:
         """Call the kernels of the statics once, too."""
         super().warm_up(robot)
-        for leg in robot.legs.values():
-            posture = leg.mechanism.initial_posture
-            lower, upper = leg.effort_limits.T
-            evaluate_indices(leg.mechanism, posture)
-            if leg.mechanism.task_coordinates == AXES:
-                load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
-                feet = np.tile(posture.foot_position, (2, 1))
-                contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
-                evaluate_footholds(leg.mechanism, leg.effort_limits, feet, contact).ranking()
+        warm_up_statics(robot)
 
     def robot_changed(self) -> None:
         """Forget what was derived from the old description and publish the new limits."""

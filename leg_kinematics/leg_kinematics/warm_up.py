@@ -1,0 +1,18 @@
+"""Compile, or load from the cache, the kernels of a robot's legs before the first question."""
+
+from __future__ import annotations
+
+from leg_kinematics.conditioning import condition_number
+from leg_kinematics.mechanism import inverse_with_jacobians
+from leg_kinematics.robot import Robot
+
+
+def warm_up_kinematics(robot: Robot) -> None:
+    """Call the kinematics of every kind of leg once."""
+    for mechanism in {leg.mechanism: None for leg in robot.legs.values()}:
+        foot = mechanism.initial_posture.foot_position
+        posture = mechanism.inverse(foot)
+        condition_number(mechanism.jacobian(posture))
+        mechanism.angular_jacobian(posture)
+        mechanism.passive_joint_positions(posture)
+        inverse_with_jacobians(mechanism, foot)
