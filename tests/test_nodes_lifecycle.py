@@ -337,7 +337,6 @@ def test_a_client_lives_through_a_restart_of_the_nodes():
         np.testing.assert_array_equal(future.wait().joint_positions, wanted)
         assert len(client.legs()) == 6
     for output in outputs:
-        assert "ready" in output
         assert "Traceback" not in output
 
 

@@ -238,6 +238,8 @@ def capacity_of_point(
         capacity * (x * across[1] + y * along[1] + normal[1]),
         capacity * (x * across[2] + y * along[2] + normal[2]),
     )
+    if not (math.isfinite(force[0]) and math.isfinite(force[1]) and math.isfinite(force[2])):
+        return math.inf, nothing, -1, False, UNBOUNDED  # beyond the range of floating point
     return capacity, force, int(joint), on_rim or friction == 0.0, BOUNDED
 
 
