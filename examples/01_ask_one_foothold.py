@@ -14,7 +14,7 @@ LEG = "right_front"
 FOOTHOLD = [0.05, 0.10, -0.65]  # x to the right, y forward, z up from the hip [m]
 LOAD = 500.0  # N
 
-with LegClient(timeout=3.0) as client:
+with LegClient(timeout=10.0) as client:
     try:
         answer = client.query_footholds(LEG, FOOTHOLD, ground="cement", load=LOAD, efforts=True)
     except ServerUnavailableError as error:

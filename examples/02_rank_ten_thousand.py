@@ -19,7 +19,7 @@ LOW, HIGH = [-0.3, -0.4, -0.75], [0.3, 0.2, -0.5]  # box of candidates in the le
 REASONS = ("REACH", "JOINT_RANGE", "PASSIVE_JOINT", "SINGULAR", "FRICTION", "EFFORT")
 
 candidates = np.random.default_rng(1).uniform(LOW, HIGH, size=(10_000, 3))
-with LegClient(timeout=3.0) as client:
+with LegClient(timeout=10.0) as client:
     try:
         client.query_footholds(LEG, candidates[:1], ground="wood", load=LOAD)  # connects
         started = time.perf_counter()

@@ -15,7 +15,7 @@ LOAD = 600.0  # N, on each foot
 HEIGHTS = np.arange(0.50, 0.751, 0.05)  # of the base frame over the ground [m]
 
 print("longest step [m] at body height", *(f"{height:8.2f}" for height in HEIGHTS), "m")
-with LegClient(timeout=3.0) as client:
+with LegClient(timeout=10.0) as client:
     for ground in ("ice", "wood", "cement"):
         try:
             by_load, by_friction = (

@@ -62,7 +62,7 @@ class TerrainWalker(Node):
         robot = self.declare_parameter("robot", "").value
         self.distance = self._number("distance", 3.0)
         self.gait = Gait(mass=self._number("mass", Gait.mass))
-        pause, patience = self._number("pause", 0.0), self._number("patience", 5.0)
+        pause, patience = self._number("pause", 0.0), self._number("patience", 10.0)
         self.terrain: Terrain = load_terrain(source)
         self.client = LegClient(namespace=robot)
         self.client.wait_until_ready(patience)
