@@ -30,6 +30,16 @@ FIGURES: dict[str, Callable[[Path], object]] = {
     "paper_000": lambda folder: [
         plot_index_map.main(["--type", "initial", "--all", str(folder)]),
         plot_index_map.main(["--type", "optimised", "--all", str(folder)]),
+        plot_index_map.main(
+            [
+                "--type",
+                "initial",
+                "--figure",
+                "7",
+                "--output",
+                str(folder / "hexapod_initial_7.png"),
+            ]
+        ),
         plot_index_map.main(["--figure", "8", "--output", str(folder / "hexapod_both_8.png")]),
     ],
     "paper_001": lambda folder: plot_index_map.main(["--robot", "quadruped", "--all", str(folder)]),

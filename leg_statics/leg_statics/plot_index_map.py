@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -15,11 +16,14 @@ from tqdm import tqdm
 from leg_kinematics.description import find_robot_file, robot_from_document
 from leg_kinematics.documents import Document
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError, ValueRangeError
+from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
 from leg_kinematics.robot import Leg
 from leg_statics import plots
+from leg_statics.global_means import means_on_grid
 from leg_statics.grounds import Ground, load_grounds
 from leg_statics.indices import find_index, supported_indices
 from leg_statics.maps import workspace_bounds
+from leg_statics.published import paper_000
 
 EXAMPLES = """\
 examples:
@@ -165,17 +169,40 @@ def draw_linkage(request: Request) -> Figure:
     )
 
 
+def draw_designs(request: Request) -> Figure:
+    """Draw figure 7: global means of the paper's 847 designs, about the dimensions of the leg."""
+    leg = request.leg.geometry
+    if not isinstance(leg, ParallelDrive):
+        raise NotSupportedError(
+            f"figure 7 varies the dimensions of {ParallelDrive.name!r}, got {leg.name!r}"
+        )
+    bar = partial(tqdm, desc="designs", unit="design", disable=None, leave=False)
+    _, means = paper_000.sampled_designs(leg, progress=bar)
+    optimum = {name: [value] for name, value in paper_000.OPTIMISED_LENGTHS.items()}
+    marked = {
+        request.leg.leg_type: means_on_grid(
+            leg, plots.DESIGN_MEANS, paper_000.PROTOCOL_GRID
+        ).values,
+        "paper's optimum": paper_000.sampled_designs(leg, optimum)[1][0],
+    }
+    return plots.plot_designs(means, marked, title=request.title)
+
+
 def _index_figure(index: str) -> Callable[[Request], Figure]:
     return lambda request: draw_index(request, index)
 
 
 FIGURES: dict[str, Callable[[Request], Figure]] = {
     **{name: _index_figure(index) for name, index in FIGURE_INDICES.items()},
+    "7": draw_designs,
     "8": draw_rated_friction,
     "steps": draw_steps,
     "capacity": draw_capacity,
     "linkage": draw_linkage,
 }
+
+
+SLOW_FIGURES = ("7",)  # drawn on request only
 
 
 def _title(robot: str, leg: Leg) -> str:
@@ -379,7 +406,11 @@ def _draw_all(request: Request, compared: Request, folder: Path, suffix: str) ->
     names = ["linkage"]
     if plots.is_spatial_leg(request.leg.mechanism):
         supported = supported_indices(request.leg.mechanism)
-        names = [name for name in FIGURES if FIGURE_INDICES.get(name, supported[0]) in supported]
+        names = [
+            name
+            for name in FIGURES
+            if FIGURE_INDICES.get(name, supported[0]) in supported and name not in SLOW_FIGURES
+        ]
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name in tqdm(names, desc="drawing", unit="figure", disable=None, leave=False):

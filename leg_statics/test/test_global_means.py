@@ -88,6 +88,15 @@ def test_a_workspace_without_volume_is_refused():
         sample_workspace(Planar(), 3)
 
 
+def test_sampled_designs_are_the_means_of_each_design():
+    grid = {"drive_lever": [0.110, 0.140], "thigh_upper": [0.2, 9.0]}  # the longest cannot be built
+    designs, means = paper_000.sampled_designs(STAGES["initial"], grid)
+    np.testing.assert_array_equal(designs, [[0.110, 0.2], [0.140, 0.2]])
+    direct = means_on_grid(STAGES["initial"], THREE, paper_000.PROTOCOL_GRID).values
+    np.testing.assert_array_equal(means[0], direct)
+    assert np.prod([len(values) for values in paper_000.SEARCH_GRID.values()]) == 847
+
+
 CLAIMS = paper_000.claim_comparisons()
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from leg_kinematics import ParallelDrive
+from leg_kinematics import GeometryError, ParallelDrive
 from leg_kinematics.arrays import FloatArray
 from leg_statics.footholds import Contact
 from leg_statics.global_means import means_on_grid
@@ -45,6 +47,12 @@ PROTOCOL_GRID = 11  # points per actuator, cell mid-points
 
 # Static friction of the foot's rubber on the ground, section 3.3.
 GROUNDS = {"ice": (0.08, 0.4), "wood": (0.6, 0.9), "cement": (0.4, 0.7)}
+# Dimensions that section 4 varies: c, l6, l7 [m]; 847 designs.
+SEARCH_GRID: dict[str, Sequence[float]] = {
+    "drive_lever": tuple(np.linspace(0.100, 0.160, 7)),
+    "parallelogram_link": tuple(np.linspace(0.250, 0.350, 11)),
+    "shank_length": tuple(np.linspace(0.320, 0.520, 11)),
+}
 STEP = 0.300  # m, the step the robot is required to make
 
 
@@ -92,6 +100,32 @@ def slices(leg: ParallelDrive, heights: FloatArray, spacing: float = 0.015) -> S
         values[:, 40],
         y,
     )
+
+
+def sampled_designs(
+    leg: ParallelDrive,
+    grid: Mapping[str, Sequence[float]] = SEARCH_GRID,
+    progress: Callable[[list[tuple[float, ...]]], Iterable[tuple[float, ...]]] = iter,
+) -> tuple[FloatArray, FloatArray]:
+    """Compute the three global means of every design of a grid: the samples of figure 7.
+
+    Args:
+        leg: The leg whose other dimensions the designs have.
+        grid: Values of each dimension to vary [m]; the paper's 7 x 11 x 11 by default.
+        progress: Wraps the list of designs to show how far it is.
+
+    Returns:
+        The designs that can be assembled (m, len(grid)) and their means (m, 3).
+    """
+    designs, means = [], []
+    for values in progress(list(product(*grid.values()))):
+        try:
+            design = replace(leg, **dict(zip(grid, values, strict=True)))  # type: ignore[arg-type]
+        except GeometryError:
+            continue
+        designs.append(values)
+        means.append(means_on_grid(design, list(MEANS["initial"]), PROTOCOL_GRID).values)
+    return np.array(designs).reshape(-1, len(grid)), np.array(means).reshape(-1, 3)
 
 
 def _trend(values: FloatArray) -> str:
