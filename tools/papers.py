@@ -42,7 +42,15 @@ FIGURES: dict[str, Callable[[Path], object]] = {
         ),
         plot_index_map.main(["--figure", "8", "--output", str(folder / "hexapod_both_8.png")]),
     ],
-    "paper_001": lambda folder: plot_index_map.main(["--robot", "quadruped", "--all", str(folder)]),
+    "paper_001": lambda folder: [
+        plot_index_map.main(["--robot", "quadruped", "--all", str(folder)]),
+        *(
+            plot_index_map.main(
+                ["--robot", "quadruped", "--index", name, "--output", str(folder / f"{name}.png")]
+            )
+            for name in ("planar_force", "planar_imbalance")  # figures 3 and 4
+        ),
+    ],
     "paper_003": lambda folder: synthesize_six_bar.main(["--figures", str(folder)]),
     "paper_004": plot_gantry_example.write_figures,
 }
