@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rclpy
-import yaml
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses, node_names
 from nodes_support import START_TIMEOUT, set_parameter, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parent.parent
 FOOT = [0.0, -0.1, -0.65]
@@ -428,7 +428,7 @@ def test_the_launch_file_is_valid_and_starts_the_same_nodes():
     functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
     assert functions == ["generate_launch_description"]
     assert "nodes.yaml" in ast.unparse(tree)
-    nodes = yaml.safe_load((ROOT / "config" / "nodes.yaml").read_text())["nodes"]
+    nodes = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")["nodes"]
     assert tuple(node["name"] for node in nodes) == node_names()
     for node in nodes:
         setup = (ROOT / node["package"] / "setup.py").read_text()

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml  # type: ignore[import-untyped]
+from ruamel.yaml import YAML
 
 NODES = Path(__file__).resolve().parent.parent / "config" / "nodes.yaml"
 STOP_SIGNALS = ((signal.SIGINT, 6.0), (signal.SIGTERM, 3.0), (signal.SIGKILL, None))
@@ -116,4 +116,4 @@ class NodeProcesses:
 
 
 def _read_nodes() -> dict[str, dict[str, str]]:
-    return {node["name"]: node for node in yaml.safe_load(NODES.read_text())["nodes"]}
+    return {node["name"]: node for node in YAML(typ="safe").load(NODES)["nodes"]}

@@ -42,7 +42,7 @@ from leg_kinematics.documents import (
     named_schema,
     shared_files,
 )
-from leg_kinematics.errors import DescriptionError, GeometryError
+from leg_kinematics.errors import DescriptionError, GeometryError, NotSupportedError
 from leg_kinematics.mechanism import Joint, geometry_parameters
 from leg_kinematics.mechanisms import MECHANISMS
 from leg_kinematics.mirrored import Mirrored
@@ -215,14 +215,14 @@ def _leg(
         raise document.error(message, "legs", name, "type")
     original = mechanisms[leg_type]
     joints = [joint.name for joint in original.joints]
-    if entry.get("mirrored", False) and original.task_coordinates != ("x", "y", "z"):
-        message = f"mechanism {original.name!r} has no point foot and cannot be mirrored"
-        raise document.error(message, "legs", name, "mirrored")
     joint_names = entry.get("joint_names", {})
     if joint_names:
         schema = mapping_schema(dict.fromkeys(joints, NAME), ())
         document.check(schema, "legs", name, "joint_names")
-    mechanism: Any = Mirrored(original) if entry.get("mirrored", False) else original
+    try:
+        mechanism: Any = Mirrored(original) if entry.get("mirrored", False) else original
+    except NotSupportedError as error:
+        raise document.error(str(error), "legs", name, "mirrored") from None
     mount = entry["mount"]
     from scipy.spatial.transform import Rotation  # slow to import, and only needed here
 

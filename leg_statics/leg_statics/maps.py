@@ -142,8 +142,8 @@ def plane_map(
     """
     if not np.isfinite(height):
         raise ValueRangeError(f"height must be finite, got {height}")
-    x, y, _ = _axes(mechanism, resolution)
     names = _layers(mechanism, layers, effort_limits, contact)
+    x, y = _axes(mechanism, resolution, 2)
     values, status = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
     return IndexMap(x, y, np.array([height]), names, values[None], status[None])
 
@@ -166,8 +166,8 @@ def volume_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If the resolution is out of range, or the map would be too large.
     """
-    x, y, z = _axes(mechanism, resolution)
     names = _layers(mechanism, layers, effort_limits, contact)
+    x, y, z = _axes(mechanism, resolution, 3)
     shape = (len(z), len(y), len(x))
     values = np.full((*shape, len(names)), np.nan)
     status = np.full(shape, Status.UNREACHABLE, dtype=np.uint8)
@@ -177,13 +177,16 @@ def volume_map(
         yield result
 
 
-def _axes(mechanism: Mechanism, resolution: float) -> list[FloatArray]:
-    """Return the grid coordinates of a box that holds the workspace; zero is one of them."""
-    first, last = _grid_range(mechanism, resolution)
-    if np.prod(last - first + 1.0) > MOST_POINTS:
+def _axes(mechanism: Mechanism, resolution: float, count: int) -> list[FloatArray]:
+    """Return the first `count` grid coordinates of a box that holds the workspace.
+
+    Zero is a multiple of the resolution on each, so that it is a grid coordinate if inside.
+    """
+    first, last = (ends[:count] for ends in _grid_range(mechanism, resolution))
+    points = float(np.prod(last - first + 1.0))
+    if points > MOST_POINTS:
         raise ValueRangeError(
-            f"resolution {resolution} m makes {np.prod(last - first + 1.0):.0f} points; "
-            f"allowed are {MOST_POINTS}"
+            f"resolution {resolution} m makes {points:.0f} points; allowed are {MOST_POINTS}"
         )
     return [resolution * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True)]
 

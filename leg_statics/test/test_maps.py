@@ -100,6 +100,12 @@ def test_a_bad_resolution_is_refused(resolution):
         next(volume_map(LEG, resolution))
 
 
+def test_a_plane_may_be_finer_than_the_volume():
+    with pytest.raises(ValueRangeError, match="points"):
+        next(volume_map(LEG, 0.002))
+    assert plane_map(LEG, -0.6, 0.002, layers=["condition_number"]).values.size > 100_000
+
+
 def test_a_bad_height_is_refused():
     with pytest.raises(ValueRangeError, match="height"):
         plane_map(LEG, np.nan, 0.05)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from leg_kinematics.errors import UnknownNameError
 from leg_kinematics.mechanisms.double_rhombus import DoubleRhombus
 from leg_kinematics.mechanisms.gantry_hybrid import GantryHybrid
 from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
@@ -18,15 +17,3 @@ MECHANISMS: dict[str, type[Any]] = {
     DoubleRhombus.name: DoubleRhombus,
     GantryHybrid.name: GantryHybrid,
 }
-
-
-def mechanism_class(name: str) -> type[Any]:
-    """Return the mechanism class registered under `name`.
-
-    Raises:
-        UnknownNameError: If there is none.
-    """
-    try:
-        return MECHANISMS[name]
-    except KeyError:
-        raise UnknownNameError("mechanism", name, MECHANISMS) from None
