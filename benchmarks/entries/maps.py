@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -12,7 +11,7 @@ from harness import Goal, Row, Settings, Timing, measure, timed_row
 from workload import CONTACT, hexapod_leg
 
 from leg_kinematics import Mechanism
-from leg_statics.maps import CAPACITY_LAYER, grid_shape, plane_map, supported_layers, volume_map
+from leg_statics.maps import CAPACITY_LAYER, grid_shape, supported_layers, volume_map
 
 THREADS = 2
 WARM_UP_RESOLUTION = 0.05  # [m]
@@ -30,29 +29,24 @@ def rows(settings: Settings) -> Iterator[Row]:
     layers = supported_layers(mechanism)
     options: dict[str, Any] = {"effort_limits": leg.effort_limits, "contact": CONTACT}
 
-    def whole(names: Sequence[str], spacing: float = resolution) -> None:
-        for _ in volume_map(mechanism, spacing, layers=names, **options):
+    def whole(names: Sequence[str], spacing: float = resolution, threads: int = 1) -> None:
+        for _ in volume_map(mechanism, spacing, layers=names, threads=threads, **options):
             pass
 
-    def timed(names: Sequence[str]) -> Timing:
-        return measure(partial(whole, names), settings, warm_up=False)
+    def timed(names: Sequence[str], threads: int = 1) -> Timing:
+        return measure(partial(whole, names, threads=threads), settings, warm_up=False)
 
     whole(layers, WARM_UP_RESOLUTION)
 
     note = f"{count:,} points, {1e3 * resolution:.2f} mm apart"
     goal = None if settings.quick else Goal(1.0)
-    yield timed_row(f"volume_map, all {len(layers)} layers", timed(layers), goal, note)
+    yield timed_row(f"volume_map, all {len(layers)} layers", timed(layers), note=note)
     free = [name for name in layers if name not in CONSTRAINT_LAYERS]
     yield timed_row("volume_map, without constraint indices", timed(free), note=note)
     yield timed_row("volume_map, load capacity", timed([CAPACITY_LAYER]), note=note)
 
-    map_ = next(volume_map(mechanism, resolution, layers=[CAPACITY_LAYER], **options))
-    plane = partial(plane_map, mechanism, resolution=resolution, layers=layers, **options)
-    with ThreadPoolExecutor(THREADS) as pool:
-        timing = measure(lambda: list(pool.map(plane, map_.z)), settings, warm_up=False)
-    yield timed_row(
-        f"plane_map of every plane, all layers, {THREADS} threads", timing, goal, note=note
-    )
+    both = timed(layers, THREADS)
+    yield timed_row(f"volume_map, all {len(layers)} layers, {THREADS} threads", both, goal, note)
 
 
 def resolution_of(mechanism: Mechanism, count: int) -> float:

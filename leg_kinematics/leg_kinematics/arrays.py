@@ -5,6 +5,7 @@ Every public function takes arrays with any leading batch axes; only the trailin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -28,15 +29,23 @@ def as_array(name: str, value: ArrayLike, *trailing: int) -> FloatArray:
         ShapeError: If it is not numeric or its trailing axes differ.
     """
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
+        array: FloatArray = np.asarray(value, np.float64)
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} must be an array of numbers: {error}") from None
-    if np.ndim(value) == 0 and not trailing:
-        array = array.reshape(())  # ascontiguousarray turns a scalar into a vector
-    if array.shape[array.ndim - len(trailing) :] != trailing:
+    if trailing and array.shape[-len(trailing) :] != trailing:
         wanted = ", ".join(["...", *map(str, trailing)])
-        raise ShapeError(f"{name} must have shape ({wanted}), got {np.shape(value)}")
+        raise ShapeError(f"{name} must have shape ({wanted}), got {array.shape}")
     return array
+
+
+def as_vectors(name: str, value: ArrayLike, length: int) -> FloatArray:
+    """Return `value`, vectors (..., length) or one number for all their elements, as an array.
+
+    Raises:
+        ShapeError: If it is not numeric or has another length.
+    """
+    array = as_array(name, value)
+    return array + np.zeros(length) if array.ndim == 0 else as_array(name, array, length)
 
 
 def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: Any) -> FloatArray:
@@ -53,6 +62,8 @@ def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: A
     """
     array = as_array(name, value, *trailing)
     leading = array.shape[: array.ndim - len(trailing)]
+    if not leading or leading == batch:
+        return array
     try:
         np.broadcast_shapes(leading, batch)
     except ValueError:
@@ -60,6 +71,19 @@ def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: A
             f"{name} has leading shape {leading}, which does not broadcast with {tuple(batch)}"
         ) from None
     return array
+
+
+def broadcast_error(shapes: Mapping[str, tuple[int, ...]]) -> ShapeError:
+    """Return the error that tells which leading shapes do not broadcast, by argument name."""
+    batch: tuple[int, ...] = ()
+    for name, shape in shapes.items():
+        try:
+            batch = np.broadcast_shapes(batch, shape)
+        except ValueError:
+            return ShapeError(
+                f"{name} has leading shape {shape}, which does not broadcast with {batch}"
+            )
+    return ShapeError(f"leading shapes do not broadcast: {dict(shapes)}")
 
 
 def as_non_negative(name: str, value: ArrayLike) -> FloatArray:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernel import inlined, kernel, scalar
 
 
 @scalar
@@ -42,18 +43,18 @@ def triangular_norm(xx: float, yx: float, yy: float, zx: float, zy: float, zz: f
     )
 
 
-@scalar
-def row_factors(m: FloatArray) -> tuple[float, float, float, float, float, float]:
+@inlined
+def row_factors(m: Sequence[Sequence[float]]) -> tuple[float, float, float, float, float, float]:
     """Return the lower triangle L of M = L Q with orthonormal Q (modified Gram-Schmidt).
 
     Rows are x, y, z: zz is the part of the z row that the x and y rows leave over, and so on.
     """
-    xx = math.sqrt(m[0, 0] ** 2 + m[0, 1] ** 2 + m[0, 2] ** 2)
-    ax, bx, cx = m[0, 0] / xx, m[0, 1] / xx, m[0, 2] / xx
-    yx = ax * m[1, 0] + bx * m[1, 1] + cx * m[1, 2]
-    zx = ax * m[2, 0] + bx * m[2, 1] + cx * m[2, 2]
-    ay, by, cy = m[1, 0] - yx * ax, m[1, 1] - yx * bx, m[1, 2] - yx * cx
-    az, bz, cz = m[2, 0] - zx * ax, m[2, 1] - zx * bx, m[2, 2] - zx * cx
+    xx = math.sqrt(m[0][0] ** 2 + m[0][1] ** 2 + m[0][2] ** 2)
+    ax, bx, cx = m[0][0] / xx, m[0][1] / xx, m[0][2] / xx
+    yx = ax * m[1][0] + bx * m[1][1] + cx * m[1][2]
+    zx = ax * m[2][0] + bx * m[2][1] + cx * m[2][2]
+    ay, by, cy = m[1][0] - yx * ax, m[1][1] - yx * bx, m[1][2] - yx * cx
+    az, bz, cz = m[2][0] - zx * ax, m[2][1] - zx * bx, m[2][2] - zx * cx
     yy = math.sqrt(ay * ay + by * by + cy * cy)
     ay, by, cy = ay / yy, by / yy, cy / yy
     zy = ay * az + by * bz + cy * cz
@@ -61,8 +62,12 @@ def row_factors(m: FloatArray) -> tuple[float, float, float, float, float, float
     return xx, yx, yy, zx, zy, math.sqrt(az * az + bz * bz + cz * cz)
 
 
-@kernel("(n,n)->()", "f8[:,:], f8[:]")
-def _condition_number(matrix, result):
+@scalar
+def condition_of_point(matrix: FloatArray) -> float:
+    """Return the condition number of a 3x3 matrix, for use inside other kernels."""
+    for value in matrix.flat:
+        if not math.isfinite(value):
+            return math.nan
     # ||M|| ||M^-1||, both from the triangle: the smallest eigenvalue of M M^T has lost its digits.
     xx, yx, yy, zx, zy, zz = row_factors(matrix)
     inverse_norm = triangular_norm(
@@ -74,10 +79,12 @@ def _condition_number(matrix, result):
         1.0 / zz,
     )
     product = triangular_norm(xx, yx, yy, zx, zy, zz) * inverse_norm
-    result[0] = product if math.isfinite(product) else math.inf
-    for value in matrix.flat:
-        if not math.isfinite(value):
-            result[0] = math.nan
+    return product if math.isfinite(product) else math.inf
+
+
+@kernel("(n,n)->()", "f8[:,:], f8[:]")
+def _condition_number(matrix, result):
+    result[0] = condition_of_point(matrix)
 
 
 def condition_number(jacobian: ArrayLike) -> FloatArray:

@@ -134,6 +134,21 @@ def inverse_with_jacobians(
     return posture, mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
 
 
+def forward_with_jacobians(
+    mechanism: Mechanism, joint_positions: ArrayLike, assembly_mode: str = ""
+) -> tuple[Posture, FloatArray, FloatArray]:
+    """Return `forward`, `jacobian` and `angular_jacobian` of the same points.
+
+    A mechanism may offer all three in one pass as a method of this name.
+    """
+    one_pass = getattr(mechanism, "forward_with_jacobians", None)
+    if one_pass is not None:
+        result: tuple[Posture, FloatArray, FloatArray] = one_pass(joint_positions, assembly_mode)
+        return result
+    posture = mechanism.forward(joint_positions, assembly_mode)
+    return posture, mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
+
+
 def parameter(doc: str, symbol: str, dimension: Dimension, default: float) -> Any:
     """Declare a geometry parameter of a mechanism dataclass.
 

@@ -10,12 +10,28 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.mechanism import Linkage, Mechanism, Posture, inverse_with_jacobians
+from leg_kinematics.mechanism import (
+    Linkage,
+    Mechanism,
+    Posture,
+    forward_with_jacobians,
+    inverse_with_jacobians,
+)
 
 # Reflection at the plane x = 0: a vector keeps its y and z, an axial vector (rotation, moment)
 # keeps its x.
 VECTOR = np.array([-1.0, 1.0, 1.0])
 AXIAL = np.array([1.0, -1.0, -1.0])
+
+
+def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
+    """Return the mechanism that is reflected, and the signs (3,) of its vectors' components.
+
+    Legs on both sides of a robot share that mechanism, so that they can be computed in one call.
+    """
+    if isinstance(mechanism, Mirrored):
+        return mechanism.original, VECTOR
+    return mechanism, np.ones(3)
 
 
 @dataclass(frozen=True)
@@ -69,6 +85,15 @@ class Mirrored:
         foot = as_array("foot_position", foot_position, 3)
         posture, jacobian, angular = inverse_with_jacobians(
             self.original, foot * VECTOR, assembly_mode
+        )
+        return _reflected(posture), VECTOR[:, None] * jacobian, AXIAL[:, None] * angular
+
+    def forward_with_jacobians(
+        self, joint_positions: ArrayLike, assembly_mode: str = ""
+    ) -> tuple[Posture, FloatArray, FloatArray]:
+        """`forward`, `jacobian` and `angular_jacobian` in one pass."""
+        posture, jacobian, angular = forward_with_jacobians(
+            self.original, joint_positions, assembly_mode
         )
         return _reflected(posture), VECTOR[:, None] * jacobian, AXIAL[:, None] * angular
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from leg_kinematics.arrays import FloatArray
-from leg_kinematics.kernel import scalar
+from leg_kinematics.kernel import inlined, scalar
 
 # A posture that stands exactly on a limit, computed with rounding, is within the limit.
 LIMIT_TOLERANCE = 1e-9  # [rad or m]
 
 
-@scalar
+@inlined
 def arctan2(y: float, x: float) -> float:
     """Return the angle of (x, y) like `math.atan2`, within 3e-16 rad and three times as quickly.
 
@@ -33,7 +33,7 @@ def arctan2(y: float, x: float) -> float:
     return math.copysign(angle, y)
 
 
-@scalar
+@inlined
 def wrapped(angle: float) -> float:
     """Return the angle in [-pi, pi) that differs by whole turns."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
@@ -55,7 +55,7 @@ def swing_plane(x: float, z: float) -> tuple[float, float]:
     return math.atan2(-x, -z), -math.hypot(x, z)
 
 
-@scalar
-def within(value: float, limits: FloatArray) -> bool:
+@inlined
+def within(value: float, limits: Sequence[float]) -> bool:
     """Tell whether lower <= value <= upper, up to rounding."""
-    return limits[0] - LIMIT_TOLERANCE <= value <= limits[1] + LIMIT_TOLERANCE
+    return (limits[0] - LIMIT_TOLERANCE <= value) & (value <= limits[1] + LIMIT_TOLERANCE)

@@ -6,11 +6,14 @@ applies to the foot (F_z > 0 for a standing leg); the sign changes here, and onl
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import ShapeError
+from leg_kinematics.kernel import inlined, kernel, scalar
 
 
 def joint_efforts(
@@ -66,12 +69,41 @@ def utilisation(
     if tau.ndim == 0:
         raise ShapeError("efforts must have shape (..., n), got ()")
     limits = as_matching("effort_limits", effort_limits, (tau.shape[-1], 2), tau.shape[:-1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(tau > 0.0, tau / limits[..., 1], tau / limits[..., 0])
-    ratio = np.where(tau == 0.0, 0.0, ratio)
-    worst = np.max(ratio, axis=-1)
-    joint = np.where(worst > 0.0, np.argmax(ratio, axis=-1), -1).astype(np.int32)
+    worst, joint = _utilisation(tau, limits)
     return worst, joint
+
+
+@scalar
+def utilisation_of_point(
+    efforts: FloatArray, lower: FloatArray, upper: FloatArray
+) -> tuple[float, int]:
+    """Return the utilisation of one point and its joint, for use inside other kernels."""
+    worst, joint = 0.0, -1
+    for k in range(len(efforts)):
+        if math.isnan(efforts[k]):
+            return math.nan, -1
+        limit = upper[k] if efforts[k] > 0.0 else lower[k]
+        share = abs(efforts[k]) / abs(limit) if efforts[k] != 0.0 else 0.0
+        if share > worst:
+            worst, joint = share, k
+    return worst, joint
+
+
+@kernel("(n),(n,k)->(),()", "f8[:], f8[:,:], f8[:], i4[:]")
+def _utilisation(efforts, limits, worst, joint):  # type: ignore[no-untyped-def]
+    worst[0], joint[0] = utilisation_of_point(efforts, limits[:, 0], limits[:, 1])
+
+
+@inlined
+def worst_moment_effort(x: float, y: float) -> float:
+    """Return the effort of a joint with (x, y, z) in J_omega: equation (27)."""
+    return math.sqrt(x * x + y * y)
+
+
+@kernel("(d,n)->(n)", "f8[:,:], f8[:]")
+def _worst_moment_efforts(angular, efforts):
+    for k in range(efforts.shape[0]):
+        efforts[k] = worst_moment_effort(angular[0, k], angular[1, k])
 
 
 def worst_moment_efforts(angular_jacobian: FloatArray) -> FloatArray:
@@ -86,4 +118,5 @@ def worst_moment_efforts(angular_jacobian: FloatArray) -> FloatArray:
     Returns:
         Efforts (..., n), per unit moment.
     """
-    return np.hypot(angular_jacobian[..., 0, :], angular_jacobian[..., 1, :])
+    efforts: FloatArray = _worst_moment_efforts(angular_jacobian)
+    return efforts

@@ -4,24 +4,38 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from leg_kinematics.arrays import FloatArray, StatusArray, as_array, as_matching, as_non_negative
-from leg_kinematics.errors import NotSupportedError, ValueRangeError
-from leg_kinematics.kernel import kernel, scalar
-from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
-from leg_kinematics.status import Status
-from leg_statics.capacity import (
-    capacity_of_point,
-    check_effort_limits,
-    rough_capacity_of_point,
-    unit_normals,
+from leg_kinematics.arrays import (
+    FloatArray,
+    StatusArray,
+    as_array,
+    as_non_negative,
+    as_vectors,
+    broadcast_error,
 )
-from leg_statics.efforts import worst_moment_efforts
+from leg_kinematics.blocks import (
+    BLOCK,
+    get3,
+    load,
+    load_columns,
+    load_numbers,
+    put,
+    store,
+)
+from leg_kinematics.errors import NotSupportedError, ValueRangeError
+from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
+from leg_kinematics.mechanism import Mechanism, Posture
+from leg_kinematics.status import Status
+from leg_statics.capacity import UP, check_effort_limits, check_normals, difference, unit
+from leg_statics.efforts import worst_moment_effort
 from leg_statics.indices import force_slopes
+from leg_statics.kinematics import Kinematics
+from leg_statics.plane_capacity import plane_capacity
+from leg_statics.three_joint_capacity import inner, three_joint_capacity
 
 
 class Verdict(IntEnum):
@@ -50,6 +64,9 @@ class Verdict(IntEnum):
 
 FEASIBLE, FRICTION, EFFORT = int(Verdict.FEASIBLE), int(Verdict.FRICTION), int(Verdict.EFFORT)
 OK = int(Status.OK)
+WRONG_CONTACT = 255  # instead of a verdict, where the contact or a limit is out of range
+ZERO = np.zeros(3)
+ZERO.flags.writeable = False
 
 
 class Contact(NamedTuple):
@@ -69,9 +86,9 @@ class Contact(NamedTuple):
     """
 
     friction: ArrayLike
-    normal: ArrayLike = (0.0, 0.0, 1.0)
+    normal: ArrayLike = UP
     load: ArrayLike = 0.0
-    moment: ArrayLike = (0.0, 0.0, 0.0)
+    moment: ArrayLike = ZERO
     any_moment: ArrayLike = 0.0
     bias: ArrayLike = 0.0
 
@@ -116,8 +133,10 @@ class Footholds(NamedTuple):
         """
         feasible = np.flatnonzero(self.feasible)
         capacity = np.ravel(self.load_capacity)[feasible]
-        friction = np.ravel(self.rated_friction)[feasible]
-        return feasible[np.lexsort((friction, -capacity))]
+        order = np.argsort(-capacity, kind="stable")
+        if np.any(np.diff(capacity[order]) == 0.0):  # rarely; it takes ten times as long
+            order = np.lexsort((np.ravel(self.rated_friction)[feasible], -capacity))
+        return feasible[order]
 
 
 def evaluate_footholds(
@@ -140,160 +159,295 @@ def evaluate_footholds(
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
     foot = as_array("foot_positions", foot_positions, len(mechanism.task_coordinates))
-    posture, jacobian, angular = inverse_with_jacobians(mechanism, foot)
-    return _evaluate(mechanism, effort_limits, posture, jacobian, angular, contact)
+    return judge_footholds(Kinematics.of_feet(mechanism, foot), effort_limits, contact)
 
 
 def evaluate_postures(
     mechanism: Mechanism, effort_limits: ArrayLike, posture: Posture, contact: Contact
 ) -> Footholds:
     """Evaluate solved postures as footholds; see `evaluate_footholds`."""
-    jacobian, angular = mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
-    return _evaluate(mechanism, effort_limits, posture, jacobian, angular, contact)
+    return judge_footholds(Kinematics(mechanism, posture), effort_limits, contact)
 
 
-def _evaluate(
-    mechanism: Mechanism,
-    effort_limits: ArrayLike,
-    posture: Posture,
-    jacobian: FloatArray,
-    angular: FloatArray,
-    contact: Contact,
+def judge_footholds(
+    kinematics: Kinematics, effort_limits: ArrayLike, contact: Contact
 ) -> Footholds:
+    """Evaluate solved postures whose Jacobians may be known; see `evaluate_footholds`."""
+    mechanism, posture = kinematics.mechanism, kinematics.posture
     if len(mechanism.task_coordinates) != 3:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has task coordinates "
             f"{', '.join(mechanism.task_coordinates)}: load capacity needs a point foot x, y, z"
         )
-    batch = np.shape(posture.status)
-    limits = as_array("effort_limits", effort_limits, len(mechanism.joints), 2)
-    check_effort_limits(limits[:, 0], limits[:, 1])
-    load = _magnitude("load", contact.load, batch)
-    friction = as_matching("friction", as_non_negative("friction", contact.friction), (), batch)
-    any_moment = _magnitude("any_moment", contact.any_moment, batch)
-    reserve: FloatArray = np.zeros(len(limits))
-    if np.any(any_moment > 0.0):
-        reserve = worst_moment_efforts(angular) * any_moment[..., None]
-    values = _footholds(
-        jacobian,
-        angular,
-        posture.status,
-        limits[:, 0] + reserve,
-        limits[:, 1] - reserve,
-        reserve,
-        _bias(contact.bias, len(limits)),
-        friction,
-        unit_normals("normal", as_matching("normal", contact.normal, (3,), batch)),
-        load,
-        _finite("moment", contact.moment, (3,), batch),
+    n = len(mechanism.joints)
+    limits = as_array("effort_limits", effort_limits, n, 2)
+    on_ground = Contact(
+        as_array("friction", contact.friction),
+        as_array("normal", contact.normal, 3),
+        as_array("load", contact.load),
+        as_array("moment", contact.moment, 3),
+        as_array("any_moment", contact.any_moment),
+        as_vectors("bias", contact.bias, n),
     )
-    verdict, capacity, mu_e, mu_full, force, efforts, share, joint = values
-    return Footholds(
-        verdict, posture, capacity, mu_e, mu_full, friction - mu_e, force, efforts, share, joint
+    try:
+        verdict, *values = _footholds(
+            limits,
+            kinematics.jacobian,
+            kinematics.angular_jacobian,
+            posture.status,
+            *on_ground,
+        )
+    except ValueError:
+        shapes = {"candidates": np.shape(posture.status)}
+        for name in ("friction", "load", "any_moment"):
+            shapes[name] = getattr(on_ground, name).shape
+        for name in ("normal", "moment", "bias"):
+            shapes[name] = getattr(on_ground, name).shape[:-1]
+        raise broadcast_error(shapes) from None
+    verdicts = verdict.tobytes()  # searched within less than a microsecond
+    if not verdicts or WRONG_CONTACT in verdicts:
+        check_effort_limits(limits[:, 0], limits[:, 1])
+        _check_contact(on_ground)
+    return Footholds(verdict, posture, *values)
+
+
+def _check_contact(contact: Contact) -> None:
+    """Raise a ValueRangeError for a value that is out of range."""
+    as_non_negative("friction", contact.friction)
+    check_normals("normal", np.asarray(contact.normal))
+    for name in ("load", "any_moment"):
+        as_non_negative(name, getattr(contact, name))
+    for name in ("load", "moment", "any_moment", "bias"):
+        array = np.asarray(getattr(contact, name))
+        if not np.isfinite(array).all():
+            raise ValueRangeError(
+                f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]}"
+            )
+
+
+# --------------------------------------------------------------------------- kernel
+
+# Rows of a block: what is given,
+STATUS, MU, NORMAL, LOAD, MOMENT, ANY_MOMENT = 0, 1, 2, 5, 6, 9
+# what is found on the way,
+VALID, HOLDS, CERTAIN, ROUGH = 10, 11, 12, 13
+# the results,
+VERDICT, CAPACITY, MU_E, MU_FULL, FORCE, SHARE, JOINT, OF_POINT = 14, 15, 16, 17, 18, 21, 22, 23
+# then what n joints have, each row n times: columns of both Jacobians (3 n), limits, bias; the
+# reserve, what it leaves of the limits, and the efforts.
+J, OMEGA, LOWER, UPPER, BIAS, RESERVE, LEAST, MOST, TAU, OF_JOINTS = (
+    0,
+    3,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    13,
+)
+
+
+@inlined
+def row_of(joint_row, n, joint):
+    """Return the row of a number of a joint."""
+    width = 3 if joint_row < LOWER else 1
+    return OF_POINT + joint_row * n + width * joint
+
+
+@inlined
+def prepare(block, i, n):
+    """Find what the actuators bear before any load: the moments and, as a bias, the leg itself."""
+    moment, normal = get3(block, MOMENT, i), unit(get3(block, NORMAL, i))
+    valid = (block[MU, i] >= 0.0) & (block[LOAD, i] >= 0.0) & (block[ANY_MOMENT, i] >= 0.0)
+    finite = normal[0] + moment[0] + moment[1] + moment[2] + block[LOAD, i] + block[ANY_MOMENT, i]
+    holds = True
+    for k in range(n):
+        lower, upper = block[row_of(LOWER, n, k), i], block[row_of(UPPER, n, k), i]
+        bias, omega = block[row_of(BIAS, n, k), i], get3(block, row_of(OMEGA, n, k), i)
+        valid &= (lower <= upper) & (lower < math.inf) & (upper > -math.inf)
+        finite += bias
+        reserve = worst_moment_effort(omega[0], omega[1]) * block[ANY_MOMENT, i]
+        least, most, effort = lower + reserve, upper - reserve, bias - inner(omega, moment)
+        holds &= (least <= effort) & (effort <= most)
+        block[row_of(RESERVE, n, k), i] = reserve
+        block[row_of(LEAST, n, k), i] = least
+        block[row_of(MOST, n, k), i] = most
+        block[row_of(TAU, n, k), i] = effort
+    block[VALID, i] = 1.0 if valid & math.isfinite(finite) else 0.0
+    block[HOLDS, i] = 1.0 if holds & (block[STATUS, i] == OK) else 0.0
+
+
+@inlined
+def solve_three(block, i):
+    """Find rated friction and load capacity of a leg with three actuators."""
+    columns = (
+        get3(block, row_of(J, 3, 0), i),
+        get3(block, row_of(J, 3, 1), i),
+        get3(block, row_of(J, 3, 2), i),
     )
+    x_slope, y_slope = force_slopes(
+        (
+            (columns[0][0], columns[1][0], columns[2][0]),
+            (columns[0][1], columns[1][1], columns[2][1]),
+            (columns[0][2], columns[1][2], columns[2][2]),
+        )
+    )
+    block[MU_E, i] = abs(y_slope)
+    block[MU_FULL, i] = math.sqrt(x_slope * x_slope + y_slope * y_slope)
+    effort = get3(block, row_of(TAU, 3, 0), i)
+    up = difference(effort, get3(block, row_of(LEAST, 3, 0), i))
+    down = difference(get3(block, row_of(MOST, 3, 0), i), effort)
+    normal = unit(get3(block, NORMAL, i))
+    found = three_joint_capacity(columns, up, down, block[MU, i], normal)
+    block[CAPACITY, i] = found.capacity
+    put(block, FORCE, i, found.force)
+    block[ROUGH, i] = found.rough
+    block[CERTAIN, i] = 1.0 if found.certain else 0.0
 
 
-# --------------------------------------------------------------------------- one candidate
+@inlined
+def judge(block, i, n):
+    """Find the verdict, and the force and efforts of the required load."""
+    capacity, load, status = block[CAPACITY, i], block[LOAD, i], block[STATUS, i]
+    solved, holds = status == OK, block[HOLDS, i] == 1.0
+    verdict = FRICTION if block[ROUGH, i] >= load else EFFORT
+    verdict = FEASIBLE if capacity >= load else verdict
+    verdict = verdict if holds else EFFORT
+    verdict = verdict if solved else status
+    block[VERDICT, i] = verdict if block[VALID, i] == 1.0 else WRONG_CONTACT
+    capacity = capacity if holds else (0.0 if solved else math.nan)
+    block[CAPACITY, i] = capacity
+    part = load / capacity if load > 0.0 else 0.0
+    loaded = holds & math.isfinite(capacity)
+    fx, fy, fz = get3(block, FORCE, i)
+    fx, fy, fz = fx * part, fy * part, fz * part
+    put(block, FORCE, i, (fx, fy, fz) if loaded else (math.nan, math.nan, math.nan))
+    most, worst = 0.0, -1.0
+    for k in range(n):
+        held = inner(get3(block, row_of(J, n, k), i), (fx, fy, fz))
+        effort = block[row_of(TAU, n, k), i] - (held if loaded else 0.0)
+        block[row_of(TAU, n, k), i] = effort if solved else math.nan
+        share = share_of_limits(
+            effort,
+            block[row_of(RESERVE, n, k), i],
+            block[row_of(LEAST, n, k), i],
+            block[row_of(MOST, n, k), i],
+        )
+        worst = k if share > most else worst
+        most = share if share > most else most
+    block[SHARE, i] = most if solved else math.nan
+    block[JOINT, i] = worst if solved else -1.0
+    block[MU_E, i] = block[MU_E, i] if solved else math.nan
+    block[MU_FULL, i] = block[MU_FULL, i] if solved else math.nan
 
 
-@scalar
-def share_of_limits(effort, reserve, lower, upper):
-    """Return the share of its limits that a joint uses when its effort may vary by the reserve."""
-    up, down = effort + reserve, effort - reserve
-    share = 0.0
-    if up > 0.0:
-        share = up / (upper + reserve)
-    if down < 0.0:
-        share = max(share, down / (lower - reserve))
-    return share
+@inlined
+def share_of_limits(effort, reserve, least, most):
+    """Return the share of its limits that a joint uses when its effort may vary by the reserve.
+
+    Args:
+        effort: Effort of the joint.
+        reserve: By how much it may vary.
+        least: Lower limit plus reserve.
+        most: Upper limit less reserve.
+    """
+    highest, lowest = effort + reserve, effort - reserve
+    above = highest / abs(most + reserve) if highest > 0.0 else 0.0
+    below = -lowest / abs(least - reserve) if lowest < 0.0 else 0.0
+    return below if below > above else above
 
 
 @kernel(
-    "(d,n),(d,n),(),(n),(n),(n),(n),(),(d),(),(d)->(),(),(),(),(d),(n),(),()",
-    "f8[:,:], f8[:,:], u1, f8[:], f8[:], f8[:], f8[:], f8, f8[:], f8, f8[:],"
-    "u1[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], i4[:]",
+    "(n,k),(points,d,n),(points,d,n),(points),(points),(points,d),(points),(points,d),(points),"
+    "(points,n)->(points),(points),(points),(points),(points),(points,d),(points,n),(points),"
+    "(points)",
+    "f8[:,:], f8[:,:,:], f8[:,:,:], u1[:], f8[:], f8[:,:], f8[:], f8[:,:], f8[:], f8[:,:],"
+    "u1[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], i4[:]",
 )
 def _footholds(
+    limits,
     jacobian,
     angular,
     status,
-    lower,
-    upper,
-    reserve,
-    bias,
     friction,
     normal,
-    load,
+    load_,
     moment,
+    any_moment,
+    bias,
     verdict,
     capacity,
     mu_e,
     mu_full,
+    margin,
     force,
     efforts,
     share,
     joint,
 ):
-    """One candidate; `lower` and `upper` are what the reserve leaves of the limits."""
-    n = len(lower)
-    verdict[0], capacity[0], share[0], joint[0] = status, math.nan, math.nan, -1
-    mu_e[0], mu_full[0] = math.nan, math.nan
-    force[:] = math.nan
-    efforts[:] = math.nan
-    if status != OK:
-        return
+    """Judge points in blocks; with three actuators the number is a constant for the compiler."""
+    n = len(limits)
+    block = np.empty((OF_POINT + OF_JOINTS * n, BLOCK))
+    for i in range(min(BLOCK, len(status))):
+        block[CERTAIN, i] = 0.0
+        block[MU_E, i] = block[MU_FULL, i] = math.nan
+        for k in range(n):
+            block[row_of(LOWER, n, k), i] = limits[k, 0]
+            block[row_of(UPPER, n, k), i] = limits[k, 1]
+    for start in range(0, len(status), BLOCK):
+        end = min(start + BLOCK, len(status))
+        load_numbers(block, STATUS, status, start, end)
+        load_numbers(block, MU, friction, start, end)
+        load(block, NORMAL, normal, start, end, 3)
+        load_numbers(block, LOAD, load_, start, end)
+        load(block, MOMENT, moment, start, end, 3)
+        load_numbers(block, ANY_MOMENT, any_moment, start, end)
+        if n == 3:
+            judge_block(block, jacobian, angular, bias, force, efforts, start, end, 3)
+        else:
+            judge_block(block, jacobian, angular, bias, force, efforts, start, end, n)
+        for i in range(end - start):
+            k = start + i
+            verdict[k], joint[k] = int(block[VERDICT, i]), int(block[JOINT, i])
+            capacity[k], share[k] = block[CAPACITY, i], block[SHARE, i]
+            mu_e[k], mu_full[k] = block[MU_E, i], block[MU_FULL, i]
+            margin[k] = block[MU, i] - block[MU_E, i]
+    ignore_float_errors()
+
+
+@inlined
+def judge_block(block, jacobian, angular, bias, force, efforts, start, end, n):
+    """Judge points start to end, whose contacts are in the block."""
+    load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
+    load_columns(block, row_of(OMEGA, n, 0), angular, start, end, n)
+    load(block, row_of(BIAS, n, 0), bias, start, end, n)
+    for i in range(end - start):
+        prepare(block, i, n)
     if n == 3:
-        x_slope, y_slope = force_slopes(jacobian)
-        mu_e[0], mu_full[0] = abs(y_slope), math.hypot(x_slope, y_slope)
-
-    # What the actuators bear before any load: the moment and, as a bias, the leg itself.
-    holds = True
-    for i in range(n):
-        efforts[i] = bias[i] - (
-            angular[0, i] * moment[0] + angular[1, i] * moment[1] + angular[2, i] * moment[2]
-        )
-        holds = holds and lower[i] <= efforts[i] <= upper[i]
-    capacity[0] = 0.0
-    verdict[0] = EFFORT
-    if holds:
-        capacity[0], direction, _, _, _ = capacity_of_point(
-            jacobian, lower, upper, efforts, friction, normal
-        )
-        if capacity[0] >= load:
-            verdict[0] = FEASIBLE
-        elif rough_capacity_of_point(jacobian, lower, upper, efforts, normal) >= load:
-            verdict[0] = FRICTION
-        if math.isfinite(capacity[0]):
-            for k in range(3):
-                force[k] = direction[k] * (load / capacity[0]) if load > 0.0 else 0.0
-            for i in range(n):
-                for k in range(3):
-                    efforts[i] -= jacobian[k, i] * force[k]
-    share[0] = 0.0
-    for i in range(n):
-        used = share_of_limits(efforts[i], reserve[i], lower[i], upper[i])
-        if used > share[0]:
-            share[0], joint[0] = used, i
+        for i in range(end - start):
+            solve_three(block, i)
+    for i in range(end - start):
+        if block[HOLDS, i] == 1.0 and block[VALID, i] == 1.0 and block[CERTAIN, i] == 0.0:
+            solve_any(block, i, n, jacobian[start + i])
+    for i in range(end - start):
+        judge(block, i, n)
+    store(block, FORCE, force, start, end, 3)
+    store(block, row_of(TAU, n, 0), efforts, start, end, n)
 
 
-# --------------------------------------------------------------------------- checks
-
-
-def _finite(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: tuple[int, ...]) -> Any:
-    array = as_matching(name, value, trailing, batch)
-    if not np.isfinite(array).all():
-        raise ValueRangeError(f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]}")
-    return array
-
-
-def _magnitude(name: str, value: ArrayLike, batch: tuple[int, ...]) -> FloatArray:
-    magnitude: FloatArray = _finite(name, as_non_negative(name, value), (), batch)
-    return magnitude
-
-
-def _bias(bias: ArrayLike, joints: int) -> FloatArray:
-    array = np.asarray(bias, dtype=np.float64)
-    if array.ndim == 0:
-        array = np.full(joints, array)
-    finite: FloatArray = _finite("bias", as_array("bias", array, joints), (joints,), ())
-    return finite
+@scalar
+def solve_any(block, i, n, jacobian):
+    """Find the load capacity of a leg with any number of actuators."""
+    lower, upper, effort = np.empty(n), np.empty(n), np.empty(n)
+    for k in range(n):
+        lower[k], upper[k] = block[row_of(LEAST, n, k), i], block[row_of(MOST, n, k), i]
+        effort[k] = block[row_of(TAU, n, k), i]
+    normal = unit(get3(block, NORMAL, i))
+    capacity, force, _, _, _ = plane_capacity(jacobian, lower, upper, effort, block[MU, i], normal)
+    block[CAPACITY, i] = capacity
+    put(block, FORCE, i, force)
+    block[ROUGH, i] = capacity
+    if capacity < block[LOAD, i]:
+        block[ROUGH, i] = plane_capacity(jacobian, lower, upper, effort, math.inf, normal)[0]

@@ -15,17 +15,18 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.conditioning import condition_number, row_factors
 from leg_kinematics.errors import NotSupportedError, ShapeError, UnknownNameError
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernel import inlined, kernel
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 from leg_statics.efforts import worst_moment_efforts
+from leg_statics.kinematics import Kinematics
 from leg_statics.planar_force import force_transmission
 
 # --------------------------------------------------------------------------- scalar mathematics
 
 
-@scalar
-def force_slopes(jacobian: FloatArray) -> tuple[float, float]:
+@inlined
+def force_slopes(jacobian: Sequence[Sequence[float]]) -> tuple[float, float]:
     """Return F_x / F_z and F_y / F_z of the force that attains eta_cF: F = J^-T tau, (17)-(22).
 
     |F_z| is largest for unit efforts along the third row of J^-T. With J = L Q that row is
@@ -42,6 +43,9 @@ def _unit_effort_force(jacobian, capacity, friction, full_friction):
     friction[0] = abs(y_slope)
     full_friction[0] = math.hypot(x_slope, y_slope)
 
+
+SWEEPS = 30  # a few suffice
+PERPENDICULAR = 1e-14  # cosine between columns that counts as 0
 
 # --------------------------------------------------------------------------- functions
 
@@ -76,14 +80,49 @@ def unit_moment_effort(angular_jacobian: FloatArray) -> FloatArray:
     return np.max(worst_moment_efforts(angular_jacobian), axis=-1)
 
 
+@kernel("(n,n)->(n)", "f8[:,:], f8[:]")
+def _singular_values(matrix, values):
+    """Singular values of a small square matrix by Hestenes' one-sided Jacobi method.
+
+    Columns are rotated until they are perpendicular to each other; their lengths are the values,
+    small ones as exact as large ones.
+    """
+    columns = matrix.copy()
+    n = len(values)
+    for _ in range(SWEEPS):
+        rotated = False
+        for i in range(n):
+            for j in range(i):
+                alpha, beta, gamma = 0.0, 0.0, 0.0
+                for k in range(n):
+                    alpha += columns[k, i] * columns[k, i]
+                    beta += columns[k, j] * columns[k, j]
+                    gamma += columns[k, i] * columns[k, j]
+                if abs(gamma) <= PERPENDICULAR * math.sqrt(alpha * beta):
+                    continue
+                rotated = True
+                zeta = 0.5 * (beta - alpha) / gamma
+                t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                c = 1.0 / math.sqrt(1.0 + t * t)
+                for k in range(n):
+                    a, b = columns[k, i], columns[k, j]
+                    columns[k, i], columns[k, j] = c * (a - t * b), c * (b + t * a)
+        if not rotated:
+            break
+    for i in range(n):
+        square = 0.0
+        for k in range(n):
+            square += columns[k, i] * columns[k, i]
+        values[i] = math.sqrt(square)
+
+
 def _root_condition(matrix: FloatArray) -> FloatArray:
     """Return sqrt(||A|| ||A^+||) over the non-zero singular values; NaN stays NaN."""
-    finite = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
-    singular = np.linalg.svd(np.where(finite[..., None, None], matrix, 1.0), compute_uv=False)
-    largest = singular[..., 0]
+    singular = _singular_values(matrix)
+    largest = np.max(singular, axis=-1)
     present = singular > 1e-9 * largest[..., None]
     smallest = np.min(np.where(present, singular, np.inf), axis=-1)
-    return np.where(finite, np.sqrt(largest / smallest), np.nan)
+    return np.where(np.isfinite(largest), np.sqrt(largest / smallest), np.nan)
 
 
 def constraint_force_index(constraint_jacobian: FloatArray) -> FloatArray:
@@ -114,7 +153,7 @@ class Index:
         equation: Where it is defined.
         better: Whether a low or a high value is better.
         doc: What it tells.
-        compute: Values (...,) from a mechanism and postures.
+        compute: Values (...,) of postures.
         supports: Whether a mechanism has what `compute` needs.
     """
 
@@ -124,7 +163,7 @@ class Index:
     equation: str
     better: Literal["low", "high"]
     doc: str
-    compute: Callable[[Mechanism, Posture], FloatArray]
+    compute: Callable[[Kinematics], FloatArray]
     supports: Callable[[Mechanism], bool]
 
 
@@ -140,18 +179,8 @@ def _has_constraints(mechanism: Mechanism) -> bool:
     return hasattr(mechanism, "constraint_jacobian")
 
 
-def _constraint_jacobian(mechanism: Any, posture: Posture) -> FloatArray:
-    jacobian: FloatArray = mechanism.constraint_jacobian(posture)
-    return jacobian
-
-
 def _has_planar_part(mechanism: Mechanism) -> bool:
     return hasattr(mechanism, "planar_jacobian")
-
-
-def _planar_jacobian(mechanism: Any, posture: Posture) -> FloatArray:
-    jacobian: FloatArray = mechanism.planar_jacobian(posture)
-    return jacobian
 
 
 INDICES: dict[str, Index] = {
@@ -164,7 +193,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (3)",
             "low",
             "Condition number of the Jacobian: how evenly the foot can move in all directions.",
-            lambda m, p: condition_number(m.jacobian(p)),
+            lambda k: condition_number(k.jacobian),
             _square,
         ),
         Index(
@@ -174,7 +203,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (21)",
             "high",
             "Largest vertical force at the foot for joint efforts of norm 1.",
-            lambda m, p: unit_effort_capacity(m.jacobian(p)),
+            lambda k: unit_effort_capacity(k.jacobian),
             _spatial_leg,
         ),
         Index(
@@ -184,7 +213,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (22)",
             "low",
             "Friction |F_y / F_z| that the ground must offer to bear that force.",
-            lambda m, p: rated_friction(m.jacobian(p)),
+            lambda k: rated_friction(k.jacobian),
             _spatial_leg,
         ),
         Index(
@@ -194,7 +223,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (22), both horizontal components",
             "low",
             "Friction sqrt(F_x² + F_y²) / F_z that the ground must offer to bear that force.",
-            lambda m, p: rated_friction_full(m.jacobian(p)),
+            lambda k: rated_friction_full(k.jacobian),
             _spatial_leg,
         ),
         Index(
@@ -204,7 +233,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (28)",
             "low",
             "Largest joint effort for a unit horizontal moment at the foot (soft ground).",
-            lambda m, p: unit_moment_effort(m.angular_jacobian(p)),
+            lambda k: unit_moment_effort(k.angular_jacobian),
             _spatial_leg,
         ),
         Index(
@@ -214,7 +243,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (31)",
             "low",
             "How evenly the drive's constraint forces are transmitted.",
-            lambda m, p: constraint_force_index(_constraint_jacobian(m, p)),
+            lambda k: constraint_force_index(k.constraint_jacobian),
             _has_constraints,
         ),
         Index(
@@ -224,7 +253,7 @@ INDICES: dict[str, Index] = {
             "paper 000 (31)",
             "low",
             "How evenly the drive's constraint moments are transmitted.",
-            lambda m, p: constraint_moment_index(_constraint_jacobian(m, p)),
+            lambda k: constraint_moment_index(k.constraint_jacobian),
             _has_constraints,
         ),
         Index(
@@ -234,7 +263,7 @@ INDICES: dict[str, Index] = {
             "paper 001 (27)",
             "high",
             "Largest foot force in the leg's plane for efforts of norm 1 of its two actuators.",
-            lambda m, p: force_transmission(_planar_jacobian(m, p)).largest_force,
+            lambda k: force_transmission(k.planar_jacobian).largest_force,
             _has_planar_part,
         ),
         Index(
@@ -244,7 +273,7 @@ INDICES: dict[str, Index] = {
             "paper 001 (28)",
             "low",
             "How unevenly the leg's plane is served: 1 - smallest / largest such force.",
-            lambda m, p: force_transmission(_planar_jacobian(m, p)).imbalance,
+            lambda k: force_transmission(k.planar_jacobian).imbalance,
             _has_planar_part,
         ),
     )
@@ -286,6 +315,14 @@ def evaluate_indices(
         UnknownNameError: If a name is not registered.
         NotSupportedError: If the mechanism does not have an index.
     """
+    return indices_of(Kinematics(mechanism, posture), names)
+
+
+def indices_of(
+    kinematics: Kinematics, names: Sequence[str] = ()
+) -> tuple[tuple[str, ...], FloatArray]:
+    """`evaluate_indices` of postures whose Jacobians may be known already."""
+    mechanism, posture = kinematics.mechanism, kinematics.posture
     supported = supported_indices(mechanism)
     chosen = tuple(names) or supported
     for name in chosen:
@@ -294,9 +331,8 @@ def evaluate_indices(
                 f"index {name!r} is not defined for mechanism {mechanism.name!r}; "
                 f"it has: {', '.join(supported)}"
             )
-    batch = np.shape(posture.status)
-    values = np.empty((*batch, len(chosen)))
+    values = np.empty((*np.shape(posture.status), len(chosen)))
     for k, name in enumerate(chosen):
-        values[..., k] = INDICES[name].compute(mechanism, posture)
+        values[..., k] = INDICES[name].compute(kinematics)
     values[np.asarray(posture.status) != Status.OK] = np.nan
     return chosen, values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -10,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.errors import NotSupportedError, UnknownNameError, ValueRangeError
-from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
-from leg_statics.footholds import Contact, evaluate_postures
+from leg_statics.footholds import Contact, judge_footholds
 from leg_statics.global_means import actuator_grid
-from leg_statics.indices import evaluate_indices, find_index, supported_indices
+from leg_statics.indices import find_index, indices_of, supported_indices
+from leg_statics.kinematics import Kinematics
 
 CAPACITY_LAYER = "load_capacity"
 MOST_POINTS = 20_000_000
@@ -155,8 +157,17 @@ def volume_map(
     layers: Sequence[str] = (),
     effort_limits: ArrayLike | None = None,
     contact: Contact | None = None,
+    threads: int = 1,
 ) -> Iterator[IndexMap]:
     """Map the layers over the whole workspace, one plane after the other.
+
+    Args:
+        mechanism: The leg's mechanism.
+        resolution: Grid spacing [m].
+        layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
+        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
+        contact: Ground for the layer "load_capacity".
+        threads: Planes that are computed at the same time.
 
     Yields:
         The map so far: all planes from the lowest, those not computed yet NaN and UNREACHABLE.
@@ -172,9 +183,17 @@ def volume_map(
     values = np.full((*shape, len(names)), np.nan)
     status = np.full(shape, Status.UNREACHABLE, dtype=np.uint8)
     result = IndexMap(x, y, z, names, values, status)
-    for k, height in enumerate(z):
-        values[k], status[k] = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
-        yield result
+
+    def compute(height: float) -> tuple[FloatArray, StatusArray]:
+        return _slice(mechanism, x, y, height, names, effort_limits, contact)
+
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for k, plane in enumerate(pool.map(compute, z.tolist())):
+            values[k], status[k] = plane
+            yield result
+    finally:  # whoever takes no more maps does not wait for those that nobody takes
+        pool.shutdown(cancel_futures=True)
 
 
 def _axes(mechanism: Mechanism, resolution: float, count: int) -> list[FloatArray]:
@@ -235,13 +254,17 @@ def _slice(
 ) -> tuple[FloatArray, StatusArray]:
     """Return values (ny, nx, K) and status (ny, nx) of one plane."""
     y_grid, x_grid = np.meshgrid(y, x, indexing="ij")
-    posture = mechanism.inverse(np.stack([x_grid, y_grid, np.full_like(x_grid, height)], axis=-1))
-    indices = [name for name in names if name != CAPACITY_LAYER]
+    grid = np.stack([x_grid, y_grid, np.full_like(x_grid, height)], axis=-1)
+    posture = mechanism.inverse(grid)
     values = np.full((*x_grid.shape, len(names)), np.nan)
+    inside = posture.status == Status.OK  # most of a box about the workspace is outside of it
+    kinematics = Kinematics(mechanism, Posture(*(field[inside] for field in posture)))
+    columns = np.empty((np.count_nonzero(inside), len(names)))
+    indices = [name for name in names if name != CAPACITY_LAYER]
     if indices:
-        columns = [names.index(name) for name in indices]
-        values[..., columns] = evaluate_indices(mechanism, posture, indices)[1]
+        columns[:, [names.index(name) for name in indices]] = indices_of(kinematics, indices)[1]
     if CAPACITY_LAYER in names and effort_limits is not None and contact is not None:
-        footholds = evaluate_postures(mechanism, effort_limits, posture, contact)
-        values[..., names.index(CAPACITY_LAYER)] = footholds.load_capacity
+        footholds = judge_footholds(kinematics, effort_limits, contact)
+        columns[:, names.index(CAPACITY_LAYER)] = footholds.load_capacity
+    values[inside] = columns
     return values, posture.status

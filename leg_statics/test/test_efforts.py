@@ -118,3 +118,10 @@ def test_limits_must_fit_the_joints():
         utilisation([1.0, 2.0], [[-1.0, 1.0]])
     with pytest.raises(ShapeError, match="efforts"):
         utilisation(1.0, [[-1.0, 1.0]])
+
+
+def test_any_effort_against_a_limit_of_zero_is_infinitely_much():
+    limits = [[0.0, 100.0], [-100.0, 0.0], [-100.0, 100.0]]
+    used, joint = utilisation([[-1.0, 0.0, 50.0], [1.0, 1.0, 50.0], [0.0, 0.0, 0.0]], limits)
+    np.testing.assert_array_equal(used, [np.inf, np.inf, 0.0])
+    np.testing.assert_array_equal(joint, [0, 1, -1])

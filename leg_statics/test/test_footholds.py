@@ -244,3 +244,42 @@ def test_any_candidates_are_taken(points, friction):
     for values in (footholds.load_capacity, footholds.utilisation, footholds.rated_friction):
         assert np.isfinite(values[good]).all()
     assert np.all(footholds.verdict[~np.isfinite(points).all(axis=1)] == Verdict.INVALID_INPUT)
+
+
+@pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 200])
+def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
+    random = np.random.default_rng(count)
+    feet = CANDIDATES.reshape(-1, 3)[random.integers(0, CANDIDATES.size // 3, count)]
+    contact = Contact(
+        friction=random.uniform(0.0, 1.0, count),
+        normal=random.normal(size=(count, 3)) + np.array([0.0, 0.0, 4.0]),
+        load=random.uniform(0.0, 400.0, count),
+        moment=random.uniform(-3.0, 3.0, (count, 3)),
+        any_moment=random.uniform(0.0, 2.0, count),
+        bias=random.uniform(-3.0, 3.0, (count, 3)),
+    )
+    together = evaluate_footholds(LEG, LIMITS, feet, contact)
+    for k in range(count):
+        alone = evaluate_footholds(LEG, LIMITS, feet[k], Contact(*(field[k] for field in contact)))
+        for name in ("verdict", "limiting_joint"):
+            assert getattr(alone, name) == getattr(together, name)[k]
+        for name in ("load_capacity", "force", "efforts", "utilisation", "friction_margin"):
+            np.testing.assert_allclose(
+                getattr(alone, name), getattr(together, name)[k], rtol=1e-12, atol=1e-12
+            )
+
+
+@pytest.mark.parametrize(
+    "contact",
+    [
+        Contact(friction=[0.4, -0.1]),
+        Contact(friction=0.4, normal=[[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]),
+        Contact(friction=0.4, load=[1.0, np.nan]),
+        Contact(friction=0.4, any_moment=[0.0, np.inf]),
+        Contact(friction=0.4, moment=[[0.0] * 3, [0.0, np.nan, 0.0]]),
+    ],
+)
+def test_one_wrong_contact_among_many_is_told_even_where_the_foot_cannot_reach(contact):
+    far = np.array([[9.0, 9.0, 9.0], [9.0, 9.0, 9.0]])
+    with pytest.raises(ValueRangeError):
+        evaluate_footholds(LEG, LIMITS, far, contact)

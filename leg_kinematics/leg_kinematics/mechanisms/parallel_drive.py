@@ -22,6 +22,7 @@ the leg frame {C} at the hip H, both with the same axes. `u(t) = (0, cos t, sin 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -31,8 +32,9 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -47,11 +49,15 @@ from leg_kinematics.scalars import arctan2, included_angle, swing_plane, within,
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`
+LIMITS_SIZE = 24  # lower and upper limits of 3 cranks and 9 passive joints
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
 
 NEWTON_STEPS = 20
 NEWTON_TOLERANCE = 1e-14  # [rad]
+
+
+Numbers = Sequence[float]  # a tuple in compiled code
 
 
 class Geometry(NamedTuple):
@@ -144,7 +150,7 @@ class Gradient(NamedTuple):
 # --------------------------------------------------------------------------- scalar mathematics
 
 
-@scalar
+@inlined
 def two_link(
     y: float, z: float, first: float, second: float, bend: float
 ) -> tuple[float, float, float, float]:
@@ -156,13 +162,13 @@ def two_link(
     return c1, s1, (y - first * c1) / second, (z - first * s1) / second
 
 
-@scalar
+@inlined
 def center_pin(g: Geometry, cp3: float, sp3: float) -> tuple[float, float]:
     """Return y, z of U3, the pin of the centre crank, in {P}."""
     return g.e + g.m3 * cp3, -g.h1 + g.m3 * sp3
 
 
-@scalar
+@inlined
 def rod(
     g: Geometry,
     side: float,
@@ -181,7 +187,7 @@ def rod(
     )
 
 
-@scalar
+@inlined
 def rod_gradient(
     g: Geometry,
     side: float,
@@ -202,7 +208,7 @@ def rod_gradient(
     )
 
 
-@scalar
+@inlined
 def gradients(g: Geometry, p: Pose) -> tuple[Gradient, Gradient]:
     """Return the derivatives of f_1 and f_2."""
     center, a, b = (p.cp3, p.sp3), (p.ca, p.sa), (p.cb, p.sb)
@@ -273,33 +279,33 @@ def newton(
     return False, a, b
 
 
-@scalar
+@inlined
 def platform_bend(g: Geometry, p: Pose) -> float:
     """Return sin(a + delta3 - phi_3), of the bend from the centre crank to U3 -> S, times U3 S."""
     along, across = g.l3 * p.cb * p.ca - g.l33 * p.sa, g.l3 * p.cb * p.sa + g.l33 * p.ca
     return across * p.cp3 - along * p.sp3
 
 
-@scalar
+@inlined
 def drive_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
     """Tell whether the drive lies strictly inside the branch, off its singularities."""
     f1, f2 = gradients(g, p)
     return (
-        f1.q * branch.crank_1 > 0.0
-        and f2.q * branch.crank_2 > 0.0
-        and platform_bend(g, p) * branch.center > 0.0
-        and (f1.a * f2.b - f1.b * f2.a) * branch.loop > 0.0
-        and p.cb > 0.0
+        (f1.q * branch.crank_1 > 0.0)
+        & (f2.q * branch.crank_2 > 0.0)
+        & (platform_bend(g, p) * branch.center > 0.0)
+        & ((f1.a * f2.b - f1.b * f2.a) * branch.loop > 0.0)
+        & (p.cb > 0.0)
     )
 
 
-@scalar
+@inlined
 def walking_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
     """Tell whether the pantograph lies inside the branch, seen from the foot and from S."""
     lever_y, lever_z = pantograph_lever(g, p.c2, p.s2)
     from_foot = p.s2 * p.c1 - p.c2 * p.s1
     from_drive = lever_z * p.c1 - lever_y * p.s1
-    return from_foot * branch.knee > 0.0 and from_drive * branch.knee > 0.0
+    return (from_foot * branch.knee > 0.0) & (from_drive * branch.knee > 0.0)
 
 
 @scalar
@@ -329,13 +335,13 @@ def solve_platform(g: Geometry, branch: Branch, q: FloatArray) -> tuple[bool, bo
     return False, closes, math.nan, math.nan
 
 
-@scalar
+@inlined
 def pantograph_lever(g: Geometry, c2: float, s2: float) -> tuple[float, float]:
     """Return R1 -> S in the pantograph's plane: c u(th2) + lg u(th2 + 90°)."""
     return g.c * c2 - g.lg * s2, g.c * s2 + g.lg * c2
 
 
-@scalar
+@inlined
 def outer_crank(
     g: Geometry, side: float, bend: float, sx: float, sy: float, sz: float
 ) -> tuple[float, float, float, float, float]:
@@ -348,7 +354,7 @@ def outer_crank(
     return c, s, x, sy - g.m1 * c, sz - g.m1 * s
 
 
-@scalar
+@inlined
 def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> Pose:
     """Return the pose that puts the foot at a point of {C}, in closed form; NaN out of reach."""
     radius = math.sqrt(x * x + z * z)
@@ -382,17 +388,26 @@ def pose_of_foot(g: Geometry, branch: Branch, x: float, y: float, z: float) -> P
     )
 
 
-@scalar
-def angles_of_pose(g: Geometry, p: Pose, q: FloatArray, closure: FloatArray) -> None:
-    """Fill the crank angles (3,) and the closure a, b, th1, th2, th3 of a pose."""
-    q[0] = wrapped(arctan2(p.sp1, p.cp1) - g.phi1)
-    q[1] = wrapped(arctan2(p.sp2, p.cp2) - g.phi1)
-    q[2] = wrapped(arctan2(p.sp3, p.cp3) - g.phi3)
-    closure[0] = arctan2(p.sa, p.ca)
-    closure[1] = arctan2(p.sb, p.cb)
-    closure[2] = arctan2(p.s1, p.c1)
-    closure[3] = arctan2(p.s2, p.c2)
-    closure[4] = arctan2(p.s3, p.c3)
+@inlined
+def crank_angles(g: Geometry, p: Pose) -> tuple[float, float, float]:
+    """Return the crank angles q about their zeros."""
+    return (
+        wrapped(arctan2(p.sp1, p.cp1) - g.phi1),
+        wrapped(arctan2(p.sp2, p.cp2) - g.phi1),
+        wrapped(arctan2(p.sp3, p.cp3) - g.phi3),
+    )
+
+
+@inlined
+def closure_angles(p: Pose) -> tuple[float, float, float, float, float]:
+    """Return the closure a, b, th1, th2, th3."""
+    return (
+        arctan2(p.sa, p.ca),
+        arctan2(p.sb, p.cb),
+        arctan2(p.s1, p.c1),
+        arctan2(p.s2, p.c2),
+        arctan2(p.s3, p.c3),
+    )
 
 
 @scalar
@@ -419,14 +434,14 @@ def foot_point(g: Geometry, th1: float, th2: float, th3: float) -> tuple[float, 
     return zeta * math.sin(th3), y, zeta * math.cos(th3)
 
 
-@scalar
+@inlined
 def in_platform(p: Pose, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return the components of a vector along x_d, y_d and w."""
     radial = y * p.ca + z * p.sa
     return x * p.cb - radial * p.sb, y * p.sa - z * p.ca, x * p.sb + radial * p.cb
 
 
-@scalar
+@inlined
 def axis_angles(p: Pose) -> tuple[float, float, float]:
     """Return the angles of U1, U2, U3 about their axes along the cranks', from the cranks."""
     return (
@@ -436,16 +451,16 @@ def axis_angles(p: Pose) -> tuple[float, float, float]:
     )
 
 
-@scalar
-def chord(p: Pose, x: float, y: float, z: float, rest: FloatArray) -> float:
+@inlined
+def chord(p: Pose, x: float, y: float, z: float, rest: Numbers) -> float:
     """Return |v - v_rest|² of a unit vector v seen from the platform; rises with their angle."""
     vx, vy, vz = in_platform(p, x, y, z)
     return (vx - rest[0]) ** 2 + (vy - rest[1]) ** 2 + (vz - rest[2]) ** 2
 
 
-@scalar
+@inlined
 def passive_measures(
-    g: Geometry, p: Pose, rest: FloatArray
+    g: Geometry, p: Pose, rest: Numbers
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Return a measure of each passive joint that rises with its excursion, cheaply.
 
@@ -466,32 +481,42 @@ def passive_measures(
     )
 
 
-@scalar
+@inlined
 def status_of_pose(
-    g: Geometry,
-    branch: Branch,
-    rest: FloatArray,
-    limits: FloatArray,
-    passive_limits: FloatArray,
-    q: FloatArray,
-    p: Pose,
+    g: Geometry, branch: Branch, rest: Numbers, limits: Numbers, q: Numbers, p: Pose
 ) -> int:
-    """Return the status of a solved point."""
-    if not (math.isfinite(p.cp1 + p.cp2 + p.cp3) and math.isfinite(p.c1)):
-        return UNREACHABLE
-    if not (drive_on_branch(g, branch, p) and walking_on_branch(g, branch, p)):
-        return SINGULAR
-    for i in range(3):
-        if not within(q[i], limits[i]):
-            return JOINT_LIMIT
-    measures = passive_measures(g, p, rest)
-    for joint in range(9):
-        if not within(measures[joint], passive_limits[joint]):
-            return PASSIVE_JOINT_LIMIT
-    return OK
+    """Return the status of a solved point.
+
+    Args:
+        g: The dimensions.
+        branch: The assembly mode's branch.
+        rest: What the passive joints' excursions are measured from, see `passive_measures`.
+        limits: Lower and upper limit of the cranks, then of the passive joints' measures.
+        q: Crank angles.
+        p: The pose.
+    """
+    reached = math.isfinite(p.cp1 + p.cp2 + p.cp3) & math.isfinite(p.c1)
+    regular = drive_on_branch(g, branch, p) & walking_on_branch(g, branch, p)
+    in_range = within(q[0], limits[0:2]) & within(q[1], limits[2:4]) & within(q[2], limits[4:6])
+    m = passive_measures(g, p, rest)
+    passive_in_range = (
+        within(m[0], limits[6:8])
+        & within(m[1], limits[8:10])
+        & within(m[2], limits[10:12])
+        & within(m[3], limits[12:14])
+        & within(m[4], limits[14:16])
+        & within(m[5], limits[16:18])
+        & within(m[6], limits[18:20])
+        & within(m[7], limits[20:22])
+        & within(m[8], limits[22:24])
+    )
+    status = OK if passive_in_range else PASSIVE_JOINT_LIMIT
+    status = status if in_range else JOINT_LIMIT
+    status = status if regular else SINGULAR
+    return status if reached else UNREACHABLE
 
 
-@scalar
+@inlined
 def walking_rates(
     g: Geometry, p: Pose, f1: Gradient, f2: Gradient, crank: int
 ) -> tuple[float, float, float]:
@@ -525,106 +550,188 @@ def walking_rates(
     )
 
 
-@scalar
-def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArray) -> None:
-    """Fill J of equation (1), foot velocity, and J_omega of (2), angular velocity of R2C."""
-    f1, f2 = gradients(g, p)
+@inlined
+def jacobian_columns(
+    g: Geometry, p: Pose, f1: Gradient, f2: Gradient, crank: int
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return column `crank` of J of equation (1), foot velocity, and of J_omega of (2), of R2C."""
     upper = g.l4 + g.l5 + g.l7
     zeta = upper * p.s1 + g.l6 * p.s2
-    for k in range(3):
-        rate_1, rate_2, rate_3 = walking_rates(g, p, f1, f2, k)
-        y_rate = -upper * p.s1 * rate_1 - g.l6 * p.s2 * rate_2
-        zeta_rate = upper * p.c1 * rate_1 + g.l6 * p.c2 * rate_2
-        jacobian[0, k] = zeta_rate * p.s3 + zeta * p.c3 * rate_3
-        jacobian[1, k] = y_rate
-        jacobian[2, k] = zeta_rate * p.c3 - zeta * p.s3 * rate_3
-        angular[0, k] = rate_1 * p.c3
-        angular[1, k] = rate_3
-        angular[2, k] = -rate_1 * p.s3
+    rate_1, rate_2, rate_3 = walking_rates(g, p, f1, f2, crank)
+    y_rate = -upper * p.s1 * rate_1 - g.l6 * p.s2 * rate_2
+    zeta_rate = upper * p.c1 * rate_1 + g.l6 * p.c2 * rate_2
+    velocity = (
+        zeta_rate * p.s3 + zeta * p.c3 * rate_3,
+        y_rate,
+        zeta_rate * p.c3 - zeta * p.s3 * rate_3,
+    )
+    return velocity, (rate_1 * p.c3, rate_3, -rate_1 * p.s3)
 
 
 # --------------------------------------------------------------------------- kernels
 
+# The inverse runs over blocks of points, with these rows:
+X, Q, CLOSURE, STATUS, J, OMEGA, ROWS = 0, 3, 6, 11, 12, 21, 30
 
-@scalar
+
+@inlined
 def solve_foot(
-    g: Geometry,
-    branch: Branch,
-    rest: FloatArray,
-    limits: FloatArray,
-    passive_limits: FloatArray,
-    foot: FloatArray,
-    q: FloatArray,
-    closure: FloatArray,
-) -> tuple[int, Pose]:
-    """Solve a foot position: fill crank angles and closure, return status and pose."""
-    pose = pose_of_foot(g, branch, foot[0], foot[1], foot[2])
-    angles_of_pose(g, pose, q, closure)
-    status = status_of_pose(g, branch, rest, limits, passive_limits, q, pose)
-    if not (math.isfinite(foot[0]) and math.isfinite(foot[1]) and math.isfinite(foot[2])):
-        status = INVALID_INPUT
-    if status in (UNREACHABLE, INVALID_INPUT):
-        q[:] = math.nan
-        closure[:] = math.nan
-    return status, pose
+    g: Geometry, branch: Branch, rest: Numbers, limits: Numbers, block: FloatArray, i: int
+) -> Pose:
+    """Solve point i of a block: fill crank angles, closure and status, return the pose."""
+    x, y, z = get3(block, X, i)
+    pose = pose_of_foot(g, branch, x, y, z)
+    q = crank_angles(g, pose)
+    status = status_of_pose(g, branch, rest, limits, q, pose)
+    status = status if math.isfinite(x) & math.isfinite(y) & math.isfinite(z) else INVALID_INPUT
+    solved = (status != UNREACHABLE) & (status != INVALID_INPUT)
+    known = 1.0 if solved else math.nan
+    block[STATUS, i] = status
+    closure = closure_angles(pose)
+    for k in range(3):
+        block[Q + k, i] = q[k] * known
+    for k in range(5):
+        block[CLOSURE + k, i] = closure[k] * known
+    return pose
 
 
 @kernel(
-    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),()",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
+    "(g),(b),(r),(l),(c),(points,n)->(points,n),(points,c),(points)",
+    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:,:], u1[:]",
 )
-def _inverse(geometry, signs, rest, limits, passive_limits, foot, shape, q, closure, status):
-    """Foot position in {C} to crank angles and closure; `shape` only sets the closure's length."""
+def _inverse(geometry, signs, rest, limits, shape, foot, q, closure, status):
+    """Foot positions in {C} to crank angles and closure; `shape` sets the closure's length."""
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     branch = Branch(*to_fixed_tuple(signs, 5))
-    status[0], _ = solve_foot(g, branch, rest, limits, passive_limits, foot, q, closure)
+    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+    block = np.empty((ROWS, BLOCK))
+    for start in range(0, len(foot), BLOCK):
+        end = min(start + BLOCK, len(foot))
+        load(block, X, foot, start, end, 3)
+        for i in range(end - start):
+            solve_foot(g, branch, at_rest, bounds, block, i)
+        store(block, Q, q, start, end, 3)
+        store(block, CLOSURE, closure, start, end, 5)
+        for i in range(end - start):
+            status[start + i] = int(block[STATUS, i])
+    ignore_float_errors()
 
 
 @kernel(
-    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),(),(n,n),(n,n)",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
+    "(g),(b),(r),(l),(c),(points,n)->(points,n),(points,c),(points),(points,n,n),(points,n,n)",
+    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:,:], u1[:], f8[:,:,:], f8[:,:,:]",
 )
 def _inverse_with_jacobians(
-    geometry, signs, rest, limits, passive_limits, foot, shape, q, closure, status, j, j_omega
+    geometry, signs, rest, limits, shape, foot, q, closure, status, jacobian, angular
 ):
     """`_inverse` and both Jacobians of the solved pose in one pass."""
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     branch = Branch(*to_fixed_tuple(signs, 5))
-    status[0], pose = solve_foot(g, branch, rest, limits, passive_limits, foot, q, closure)
-    fill_jacobians(g, pose, j, j_omega)
+    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+    block = np.empty((ROWS, BLOCK))
+    for start in range(0, len(foot), BLOCK):
+        end = min(start + BLOCK, len(foot))
+        load(block, X, foot, start, end, 3)
+        for i in range(end - start):
+            pose = solve_foot(g, branch, at_rest, bounds, block, i)
+            f1, f2 = gradients(g, pose)
+            for crank in range(3):
+                v, omega = jacobian_columns(g, pose, f1, f2, crank)
+                put(block, J + 3 * crank, i, v)
+                put(block, OMEGA + 3 * crank, i, omega)
+        store(block, Q, q, start, end, 3)
+        store(block, CLOSURE, closure, start, end, 5)
+        store_columns(block, J, jacobian, start, end, 3)
+        store_columns(block, OMEGA, angular, start, end, 3)
+        for i in range(end - start):
+            status[start + i] = int(block[STATUS, i])
+    ignore_float_errors()
 
 
-@kernel(
-    "(g),(b),(r),(n,k),(p,k),(n),(c)->(n),(c),()",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
-)
-def _forward(geometry, signs, rest, limits, passive_limits, q, shape, foot, closure, status):
-    """Crank angles to foot position in {C} and closure."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
+@scalar
+def solve_cranks(
+    g: Geometry,
+    branch: Branch,
+    rest: Numbers,
+    limits: Numbers,
+    q: FloatArray,
+    foot: FloatArray,
+    closure: FloatArray,
+) -> int:
+    """Solve crank angles: fill foot position and closure, return the status."""
     foot[:] = math.nan
     closure[:] = math.nan
     if not (math.isfinite(q[0]) and math.isfinite(q[1]) and math.isfinite(q[2])):
-        status[0] = INVALID_INPUT
-        return
+        return INVALID_INPUT
     found, closes, a, b = solve_platform(g, branch, q)
     if not found:
-        status[0] = SINGULAR if closes else UNREACHABLE
-        return
+        return SINGULAR if closes else UNREACHABLE
     th1, th2, th3 = pantograph_of_drive(g, branch.knee, q[2], a, b)
     if not math.isfinite(th1 + th2):
-        status[0] = UNREACHABLE
-        return
+        return UNREACHABLE
     closure[0], closure[1], closure[2], closure[3], closure[4] = a, b, th1, th2, th3
     foot[0], foot[1], foot[2] = foot_point(g, th1, th2, th3)
     pose = pose_of_angles(g, q, closure)
-    status[0] = status_of_pose(g, branch, rest, limits, passive_limits, q, pose)
+    return status_of_pose(g, branch, rest, limits, (q[0], q[1], q[2]), pose)
+
+
+@scalar
+def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArray) -> None:
+    """Fill J of equation (1), foot velocity, and J_omega of (2), angular velocity of R2C."""
+    f1, f2 = gradients(g, p)
+    for crank in range(3):
+        v, omega = jacobian_columns(g, p, f1, f2, crank)
+        for k in range(3):
+            jacobian[k, crank], angular[k, crank] = v[k], omega[k]
+
+
+@kernel(
+    "(g),(b),(r),(l),(n),(c)->(n),(c),()",
+    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]",
+)
+def _forward(geometry, signs, rest, limits, q, shape, foot, closure, status):
+    """Crank angles to foot position in {C} and closure."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+    status[0] = solve_cranks(g, branch, at_rest, bounds, q, foot, closure)
+
+
+@kernel(
+    "(g),(b),(r),(l),(n),(c)->(n),(c),(),(n,n),(n,n)",
+    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
+)
+def _forward_with_jacobians(
+    geometry, signs, rest, limits, q, shape, foot, closure, status, jacobian, angular
+):
+    """`_forward` and both Jacobians of the solved pose in one pass."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+    status[0] = solve_cranks(g, branch, at_rest, bounds, q, foot, closure)
+    fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
 
 
 @kernel("(g),(n),(c)->(n,n),(n,n)", "f8[:], f8[:], f8[:], f8[:,:], f8[:,:]")
 def _jacobians(geometry, q, closure, jacobian, angular):
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
+
+
+@kernel("(g),(n),(c),(w)->(n,w)", "f8[:], f8[:], f8[:], f8[:], f8[:,:]")
+def _constraint_jacobian(geometry, q, closure, shape, jacobian):
+    """Constraint wrenches of the RU limb; `shape` only sets the length of a wrench."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    p = pose_of_angles(g, q, closure)
+    # U3 seen from G is -l3 w; the moments are its cross products with s_q2 and n2
+    wx, wy, wz = -g.l3 * p.sb, -g.l3 * p.cb * p.ca, -g.l3 * p.cb * p.sa
+    jacobian[:] = 0.0
+    jacobian[0, 4], jacobian[0, 5] = p.ca, p.sa  # n1
+    jacobian[1, 0] = 1.0  # s_q2
+    jacobian[1, 4], jacobian[1, 5] = wz, -wy
+    jacobian[2, 1], jacobian[2, 2] = p.cp3, p.sp3  # n2
+    jacobian[2, 3] = wy * p.sp3 - wz * p.cp3
+    jacobian[2, 4], jacobian[2, 5] = -wx * p.sp3, wx * p.cp3
 
 
 @kernel("(g),(c),(b)->(c),(b)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
@@ -656,7 +763,8 @@ def _passive_rest(geometry, q, closure, shape, rest):
 @kernel("(g),(r),(n),(c),(p)->(p)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
 def _passive_measures(geometry, rest, q, closure, shape, result):
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    measures = passive_measures(g, pose_of_angles(g, q, closure), rest)
+    pose = pose_of_angles(g, q, closure)
+    measures = passive_measures(g, pose, to_fixed_tuple(rest, REST_SIZE))
     for joint in range(9):
         result[joint] = measures[joint]
 
@@ -796,8 +904,7 @@ class ParallelDrive(Dimensioned):
                 self._geometry,
                 self._branch(assembly_mode),
                 self._rest,
-                self.joint_limits,
-                self._passive_bounds,
+                np.concatenate([self.joint_limits, self._passive_bounds]).ravel(),
             )
         return self._known_parameters[assembly_mode]
 
@@ -821,6 +928,16 @@ class ParallelDrive(Dimensioned):
         foot, closure, status = _forward(*self._parameters(assembly_mode), q, np.zeros(5))
         return Posture(q, closure, foot, status)
 
+    def forward_with_jacobians(
+        self, joint_positions: ArrayLike, assembly_mode: str = ""
+    ) -> tuple[Posture, FloatArray, FloatArray]:
+        """`forward`, `jacobian` and `angular_jacobian` in one pass."""
+        q = as_array("joint_positions", joint_positions, 3)
+        foot, closure, status, jacobian, angular = _forward_with_jacobians(
+            *self._parameters(assembly_mode), q, np.zeros(5)
+        )
+        return Posture(q, closure, foot, status), jacobian, angular
+
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the cranks, in closed form.
 
@@ -832,7 +949,7 @@ class ParallelDrive(Dimensioned):
             The posture; NaN where the foot is out of reach.
         """
         foot = as_array("foot_position", foot_position, 3)
-        q, closure, status = _inverse(*self._parameters(assembly_mode), foot, np.zeros(5))
+        q, closure, status = _inverse(*self._parameters(assembly_mode), np.zeros(5), foot)
         return Posture(q, closure, foot, status)
 
     def inverse_with_jacobians(
@@ -841,7 +958,7 @@ class ParallelDrive(Dimensioned):
         """`inverse`, `jacobian` and `angular_jacobian` in one pass, for half the price."""
         foot = as_array("foot_position", foot_position, 3)
         q, closure, status, jacobian, angular = _inverse_with_jacobians(
-            *self._parameters(assembly_mode), foot, np.zeros(5)
+            *self._parameters(assembly_mode), np.zeros(5), foot
         )
         return Posture(q, closure, foot, status), jacobian, angular
 
@@ -876,17 +993,10 @@ class ParallelDrive(Dimensioned):
         n1 = s_q2 x s_q3 and two forces through U3 along s_q2 (the x axis) and
         n2 = (s_q1 x n3) x s_q2 = n3, the direction of the centre crank.
         """
-        a, b = posture.closure[..., 0], posture.closure[..., 1]
-        phi3 = self.center_crank_zero + posture.joint_positions[..., 2]
-        zero, one = np.zeros_like(a), np.ones_like(a)
-        n1 = np.stack([zero, np.cos(a), np.sin(a)], axis=-1)
-        s_q2 = np.stack([one, zero, zero], axis=-1)
-        n2 = np.stack([zero, np.cos(phi3), np.sin(phi3)], axis=-1)
-        w = np.stack([np.sin(b), np.cos(b) * np.cos(a), np.cos(b) * np.sin(a)], axis=-1)
-        to_pin = -self.platform_length * w
-        force = np.stack([np.zeros_like(n1), s_q2, n2], axis=-2)
-        moment = np.stack([n1, np.cross(to_pin, s_q2), np.cross(to_pin, n2)], axis=-2)
-        return np.concatenate([force, moment], axis=-1)
+        jacobian: FloatArray = _constraint_jacobian(
+            self._geometry, posture.joint_positions, posture.closure, np.zeros(6)
+        )
+        return jacobian
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them."""

@@ -1,0 +1,54 @@
+"""Solved postures of a leg with their Jacobians: what all statics is computed from."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
+
+
+class Kinematics:
+    """Postures and their Jacobians, each computed once, and only if needed.
+
+    Attributes:
+        mechanism: The leg's mechanism.
+        posture: Solved postures (...).
+    """
+
+    def __init__(self, mechanism: Mechanism, posture: Posture) -> None:
+        self.mechanism: Any = mechanism  # some Jacobians exist for some mechanisms only
+        self.posture = posture
+
+    @classmethod
+    def of_feet(cls, mechanism: Mechanism, foot_positions: FloatArray) -> Kinematics:
+        """Solve for foot positions (..., t), with both Jacobians in the same pass."""
+        posture, jacobian, angular = inverse_with_jacobians(mechanism, foot_positions)
+        kinematics = cls(mechanism, posture)
+        kinematics.jacobian, kinematics.angular_jacobian = jacobian, angular
+        return kinematics
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """J of v = J q' (..., t, n)."""
+        jacobian: FloatArray = self.mechanism.jacobian(self.posture)
+        return jacobian
+
+    @cached_property
+    def angular_jacobian(self) -> FloatArray:
+        """J_omega of omega = J_omega q' (..., 3, n)."""
+        jacobian: FloatArray = self.mechanism.angular_jacobian(self.posture)
+        return jacobian
+
+    @cached_property
+    def constraint_jacobian(self) -> FloatArray:
+        """Constraint wrenches of the drive (..., c, 6)."""
+        jacobian: FloatArray = self.mechanism.constraint_jacobian(self.posture)
+        return jacobian
+
+    @cached_property
+    def planar_jacobian(self) -> FloatArray:
+        """Jacobian of the foot in the leg's plane (..., 2, 2)."""
+        jacobian: FloatArray = self.mechanism.planar_jacobian(self.posture)
+        return jacobian
