@@ -86,7 +86,7 @@ class Settings:
     """
 
     quick: bool = False
-    soak: float = 10.0
+    soak: float = 60.0
     show: Callable[[str], None] = lambda text: None
 
     @property

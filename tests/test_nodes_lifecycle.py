@@ -432,4 +432,4 @@ def test_the_launch_file_is_valid_and_starts_the_same_nodes():
     assert tuple(node["name"] for node in nodes) == node_names()
     for node in nodes:
         setup = (ROOT / node["package"] / "setup.py").read_text()
-        assert f"{node['executable']} = {node['package']}." in setup
+        assert f'"{node["executable"]} = leg_msgs_py.nodes:{node["executable"]}"' in setup

@@ -188,9 +188,7 @@ def test_a_cancelled_map_gives_what_there_is(suite, hexapod):
 
 def test_a_map_that_waits_for_another_can_be_cancelled(suite):
     begun, heard = [], []
-    first = suite.client.compute_index_map_async(
-        LEG, LONG["resolution"], ["constraint_moment"], on_progress=begun.append
-    )
+    first = suite.client.compute_index_map_async(LEG, LONG["resolution"], on_progress=begun.append)
     wait_for(lambda: begun)
     second = suite.client.compute_index_map_async(LEG, 0.05, on_progress=heard.append)
     wait_for(lambda: heard)

@@ -1,18 +1,27 @@
 """Joint states in, leg states out: what the statics node makes of a stream, good or bad."""
 
 import itertools
+import json
 import math
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from leg_msgs.msg import LegStates, PointStatus
 from nodes_support import set_parameter, wait_for
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from leg_statics.capacity import load_capacity
 from leg_statics.indices import condition_number, rated_friction
+
+SENDER = Path(__file__).resolve().parent.parent / "benchmarks" / "children" / "sender.py"
+DEEP = QoSProfile(depth=2000)
 
 _stamps = itertools.count(1)
 
@@ -26,7 +35,7 @@ class Stream:
         self.node = node
         self.publisher = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
         self.subscriptions = [
-            node.create_subscription(LegStates, "/statics/leg_states", self.receive, 10),
+            node.create_subscription(LegStates, "/statics/leg_states", self.receive, DEEP),
             node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnose, 10),
         ]
         wait_for(lambda: self.publisher.get_subscription_count() == 2)  # statics and maps
@@ -221,6 +230,64 @@ def test_the_rate_of_states_can_be_limited(stream, suite):
         assert not any(stamp in stream.states for stamp in stamps)
     finally:
         assert set_parameter(node, "statics", "state_rate_limit", 0.0).successful
+
+
+def test_no_message_of_a_steady_stream_is_lost(stream):
+    received = []
+    subscription = stream.node.create_subscription(
+        LegStates, "/statics/leg_states", received.append, DEEP, raw=True
+    )
+    dropped = int(stream.value("dropped inputs"))
+    try:
+        command = [sys.executable, SENDER, "400", "4"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sender:
+            sent = json.loads(sender.communicate(timeout=60.0)[0])["sent"]
+        warm_up = bytes(8)  # stamp zero, after the encapsulation
+        wait_for(lambda: sum(data[4:12] != warm_up for data in received) == sent)
+    finally:
+        stream.node.destroy_subscription(subscription)
+    assert int(stream.value("dropped inputs")) == dropped
+
+
+def test_no_message_of_a_burst_is_lost(stream):
+    stamps = [stream.send(LEFT_FRONT, JOINTS) for _ in range(300)]
+    wait_for(lambda: stamps[-1] in stream.states)
+    assert not set(stamps) - set(stream.states)
+
+
+def test_a_flood_is_left_out_counted_and_over_when_it_ends(stream, suite):
+    message = JointState(name=LEFT_FRONT, position=JOINTS)
+    message.header.stamp.sec = next(_stamps)
+    flood = serialize_message(message)
+    end = time.monotonic() + 1.5
+    while time.monotonic() < end:
+        stream.publisher.publish(flood)
+    footholds = suite.client.query_footholds("left_front", [0.0, -0.1, -0.65], 0.4, load=100.0)
+    assert footholds.load_capacity > 100.0
+    assert stream.ask(LEFT_FRONT, JOINTS)["left_front"].status == PointStatus.OK
+    assert int(stream.value("dropped: joint_states")) > 0
+    assert suite.nodes.ended() == {}
+
+
+def test_bytes_that_are_no_message_are_refused(stream):
+    before = int(stream.value("refused: joint_states") or 0)
+    whole = serialize_message(JointState(name=LEFT_FRONT, position=JOINTS))
+    stream.publisher.publish(whole[: len(whole) // 2])
+    wait_for(lambda: int(stream.value("refused: joint_states") or 0) == before + 1)
+    assert "cannot be decoded" in stream.value("last error")
+    assert stream.ask(LEFT_FRONT, JOINTS)["left_front"].status == PointStatus.OK
+
+
+def test_stamps_that_do_not_increase_are_answered_and_counted(stream):
+    before = int(stream.value("out of order inputs"))
+    stamp = stream.send(LEFT_FRONT, JOINTS)
+    wait_for(lambda: stamp in stream.states)
+    del stream.states[stamp]
+    message = JointState(name=LEFT_FRONT, position=JOINTS)
+    message.header.stamp.sec = stamp
+    stream.publisher.publish(message)
+    wait_for(lambda: stamp in stream.states)
+    assert int(stream.value("out of order: joint_states")) == before + 1
 
 
 def test_diagnostics_tell_rate_latency_and_health(stream, suite):

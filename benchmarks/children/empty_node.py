@@ -6,11 +6,10 @@ import sys
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from leg_kinematics.robot_node import SERVICE_QOS, run
+from leg_kinematics.robot_node import SERVICE_QOS, STREAM_QOS, run
 
 
 class EmptyNode(Node):
@@ -19,10 +18,8 @@ class EmptyNode(Node):
     def __init__(self) -> None:
         super().__init__("empty")
         self.create_service(Trigger, "~/trigger", self.answer, qos_profile=SERVICE_QOS)
-        self._relay = self.create_publisher(JointState, "~/joint_states", 10)
-        self.create_subscription(
-            JointState, "joint_states", self._relay.publish, qos_profile_sensor_data
-        )
+        self._relay = self.create_publisher(JointState, "~/joint_states", STREAM_QOS.depth)
+        self.create_subscription(JointState, "joint_states", self._relay.publish, STREAM_QOS)
 
     def answer(self, request: Any, response: Any) -> Any:
         """Answer an empty request."""

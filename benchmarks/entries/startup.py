@@ -13,31 +13,37 @@ from pathlib import Path
 
 from harness import Goal, Row, Settings, summary, timed_row
 
-PROGRAM = Path(__file__).resolve().parent.parent / "children" / "first_answer.py"
+CHILDREN = Path(__file__).resolve().parent.parent / "children"
 
 
 def rows(settings: Settings) -> Iterator[Row]:
     """Yield times of fresh processes."""
-    first_answer()  # fills the cache
+    times_of("first_answer")  # fills the cache
     repeats = settings.count(9, 3)
     bare = [bare_python() for _ in range(repeats)]
-    warm = [first_answer() for _ in range(repeats)]
+    warm = [times_of("first_answer") for _ in range(repeats)]
+    node = [times_of("import_node") for _ in range(repeats)]
     yield timed_row("python alone", summary(bare), note="for comparison; not part of the others")
     yield timed_row("import", summary([t["import"] for t in warm]), Goal(1.0), "warm cache")
+    yield timed_row("import of a node", summary([t["import"] for t in node]), Goal(1.0), "with ROS")
     yield timed_row(
         "import to first answer", summary([t["answer"] for t in warm]), note="warm cache"
     )
     settings.show("compiling everything")
     with tempfile.TemporaryDirectory() as folder:
-        cold = first_answer(folder)
+        cold = times_of("first_answer", folder)
     yield Row("import to first answer, cold", cold["answer"], note="everything is compiled, once")
 
 
-def first_answer(cache: str | None = None) -> dict[str, float]:
-    """Return the times of a fresh process, with a cache folder of its own if one is given."""
+def times_of(child: str, cache: str | None = None) -> dict[str, float]:
+    """Return what a fresh process measures, with a cache folder of its own if one is given."""
     environment = {**os.environ, **({"NUMBA_CACHE_DIR": cache} if cache else {})}
     answer = subprocess.run(
-        [sys.executable, PROGRAM], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, CHILDREN / f"{child}.py"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     times: dict[str, float] = json.loads(answer.stdout)
     return times

@@ -56,18 +56,24 @@ class Document:
 
     Attributes:
         path: Its file.
+        text: Its text.
         root: Its content.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read a file; duplicate keys are errors.
+    def __init__(self, path: Path, text: str | None = None) -> None:
+        """Parse a file; duplicate keys are errors.
+
+        Args:
+            path: The file, for messages too.
+            text: Its text; None to read it from the file.
 
         Raises:
             DescriptionError: If it cannot be read or parsed.
         """
         self.path = path
         try:
-            self.root: Any = YAML(typ="rt").load(path.read_text(encoding="utf-8"))
+            self.text = path.read_text(encoding="utf-8") if text is None else text
+            self.root: Any = YAML(typ="rt").load(self.text)
         except MarkedYAMLError as error:
             mark = error.problem_mark
             where = f"{path}:{mark.line + 1}" if mark else str(path)

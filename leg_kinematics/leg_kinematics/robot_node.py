@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import threading
 import time
 import traceback
-from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,23 +20,28 @@ from rcl_interfaces.msg import (  # type: ignore[import-untyped]
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import Executor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError
-from leg_kinematics.requests import error_code
+from leg_kinematics.health import Health
+from leg_kinematics.node_log import LibraryLog, NodeLog
+from leg_kinematics.requests import RequestError, error_code
 from leg_kinematics.robot import Robot
 from leg_kinematics.warm_up import warm_up_kinematics
 
 # The default depth of 10 loses requests when many clients ask at once.
 SERVICE_QOS = QoSProfile(depth=256)
-LOG_PERIOD = 5.0  # a bad stream is logged once in this time [s]
+STREAM_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 STOP_TIMEOUT = 5.0  # a callback may take this long to end when the node stops [s]
 
 
@@ -58,6 +63,9 @@ class RobotNode(Node):
         super().__init__(name)
         self._started = time.monotonic()
         self.health = Health()
+        self.log = NodeLog(self.get_logger())
+        self._library_log = LibraryLog(self.log)
+        self._library_log.install()
         self.declare(
             "robot", "hexapod", "Robot description: path of a YAML file or name of a shipped robot."
         )
@@ -74,6 +82,11 @@ class RobotNode(Node):
         self.add_post_set_parameters_callback(self._apply_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(1.0 / self.value("diagnostics_rate"), self._publish_diagnostics)
+
+    def destroy_node(self) -> None:
+        """Leave the logging of libraries alone again, then destroy the node."""
+        self._library_log.remove()
+        super().destroy_node()
 
     # ------------------------------------------------------------------ parameters
 
@@ -164,6 +177,42 @@ class RobotNode(Node):
 
         self.create_service(service_type, f"~/{name}", answer, qos_profile=SERVICE_QOS)
 
+    def listen(self, message_type: Any, topic: str, receive: Callable[[Any], None]) -> None:
+        """Receive a stream of sensor data whose every fault is counted.
+
+        Nothing is lost while a request or a pause holds the node up for a second at 1 kHz. What
+        the node cannot follow is left out, so that requests are still answered.
+
+        Args:
+            message_type: Type of the messages.
+            topic: Name of the topic.
+            receive: Works a message off, or raises.
+        """
+        backlog = _Backlog(self, STREAM_QOS.depth)
+
+        def take(data: bytes) -> None:
+            self.health.received += 1
+            if backlog.is_too_long():
+                self.health.drop(topic, "more messages than the node can follow")
+                return
+            with self.health.timed():
+                try:
+                    receive(_decoded(data, message_type))
+                except Exception as error:
+                    self._failure(topic, error)
+
+        def lose(event: Any) -> None:
+            self.health.drop(topic, "lost by the middleware", event.total_count_change)
+
+        self.create_subscription(
+            message_type,
+            topic,
+            take,
+            STREAM_QOS,
+            raw=True,  # messages that are left out shall cost nothing
+            event_callbacks=SubscriptionEventCallbacks(message_lost=lose),
+        )
+
     def header(self, frame_id: str) -> Header:
         """Return a header with the present time."""
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
@@ -182,113 +231,73 @@ class RobotNode(Node):
         if error_code(error) == ErrorCode.INTERNAL:
             message = f"{type(error).__name__}: {message}"
             self.health.fault(source, message)
-            self.get_logger().error(f"{source}: {traceback.format_exc()}")
+            self.log.error(f"{source} failed", f"{source}: {traceback.format_exc()}")
         else:
             self.health.refuse(source, message)
-            self.get_logger().warning(
-                f"{source} refused: {message}", throttle_duration_sec=LOG_PERIOD
-            )
+            self.log.warning(f"{source} refused", f"{source} refused: {message}")
         return message
 
     def _publish_diagnostics(self) -> None:
         status = DiagnosticStatus(
             name=f"{self.get_fully_qualified_name()}: health", hardware_id=self.robot.name
         )
-        status.level, status.message, values = self.health.report()
-        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        report = self.health.report()
+        status.level, status.message = bytes([report.level]), report.message
+        status.values = [KeyValue(key=key, value=value) for key, value in report.values.items()]
+        self.log.flush()
         self._diagnostics.publish(DiagnosticArray(header=self.header(""), status=[status]))
 
 
-class Health:
-    """Counts what a node does, for its diagnostics.
+def _decoded(data: bytes, message_type: Any) -> Any:
+    """Return the message of serialized data.
 
-    Attributes:
-        received: Messages of the input stream.
-        notes: Conditions that last, such as a leg that is not updated, by what they concern.
+    Raises:
+        RequestError: If the data are not such a message.
+    """
+    try:
+        return deserialize_message(data, message_type)
+    except Exception as error:
+        raise RequestError(f"{len(data)} bytes that cannot be decoded: {error}") from error
+
+
+class _Backlog:
+    """Tells whether the executor has more messages of a stream to announce than are kept.
+
+    The queue of an `EventsExecutor` is first in, first out and has no bound: if messages came
+    faster than they are worked off, requests would wait behind more and more of them. A task that
+    is put at the end of the queue from time to time counts the messages before it.
+
+    Args:
+        node: The node whose executor it is.
+        limit: Number of messages that are kept.
     """
 
-    def __init__(self) -> None:
-        self.received = 0
-        self.notes: dict[str, str] = {}
-        self._callbacks = 0
-        self._refused: Counter[str] = Counter()
-        self._faults = 0
-        self._last_error = ""
-        self._worst = 0.0
-        self._begin_period()
+    def __init__(self, node: Node, limit: int) -> None:
+        self._node = node
+        self._limit = limit
+        self._count = -limit
 
-    def timed(self) -> _Stopwatch:
-        """Measure a callback: `with health.timed():`."""
-        return _Stopwatch(self)
+    def is_too_long(self) -> bool:
+        """Count a message and tell whether too many are still to come."""
+        self._count += 1
+        if self._count == 0:
+            self._node.executor.create_task(self._reach_end)
+        return self._count > self._limit
 
-    def observe(self, seconds: float) -> None:
-        """Count a callback and its duration."""
-        self._callbacks += 1
-        self._worst = max(self._worst, seconds)
-
-    def refuse(self, source: str, reason: str) -> None:
-        """Count an input that was refused."""
-        self._refused[source] += 1
-        self._recent_refusals += 1
-        self._last_error = f"{source}: {reason}"
-
-    def fault(self, source: str, reason: str) -> None:
-        """Count a fault of the node itself."""
-        self._faults += 1
-        self._recent_faults += 1
-        self._last_error = f"{source}: {reason}"
-
-    def report(self) -> tuple[bytes, str, dict[str, str]]:
-        """Return level, message and values since the last report, and begin a new period."""
-        elapsed = max(time.monotonic() - self._began, 1e-9)
-        values = {
-            "input rate [Hz]": f"{(self.received - self._received_before) / elapsed:.1f}",
-            "worst callback latency [ms]": f"{1e3 * self._worst:.3f}",
-            "callbacks": str(self._callbacks),
-            "refused inputs": str(sum(self._refused.values())),
-            **{f"refused: {source}": str(count) for source, count in self._refused.items()},
-            "internal faults": str(self._faults),
-            **self.notes,
-            "last error": self._last_error,
-        }
-        if self._recent_faults:
-            level, message = DiagnosticStatus.ERROR, f"internal fault: {self._last_error}"
-        elif self._recent_refusals:
-            level, message = DiagnosticStatus.WARN, f"refused input: {self._last_error}"
-        elif self.notes:
-            level, message = DiagnosticStatus.WARN, "; ".join(self.notes.values())
-        else:
-            level, message = DiagnosticStatus.OK, "ok"
-        self._begin_period()
-        return level, message, values
-
-    def _begin_period(self) -> None:
-        self._began = time.monotonic()
-        self._received_before = self.received
-        self._worst = 0.0
-        self._recent_refusals = 0
-        self._recent_faults = 0
-
-
-class _Stopwatch:
-    """Reports the duration of a block to a `Health`."""
-
-    def __init__(self, health: Health) -> None:
-        self._health = health
-
-    def __enter__(self) -> None:
-        self._start = time.perf_counter()
-
-    def __exit__(self, *_: object) -> None:
-        self._health.observe(time.perf_counter() - self._start)
+    def _reach_end(self) -> None:
+        self._count = -self._limit
 
 
 # --------------------------------------------------------------------------- start and stop
 
 
 def make_executor() -> Executor:
-    """Return the executor of all nodes: one thread, so that callbacks need no locks."""
-    return SingleThreadedExecutor()
+    """Return the executor of all nodes: one thread, so that callbacks need no locks.
+
+    rclpy's other executors build a set of all that may happen anew, in Python, for every message:
+    that takes longer than to answer it.
+    """
+    return EventsExecutor()
 
 
 def run(make_node: Callable[[], RobotNode]) -> int:
@@ -303,27 +312,40 @@ def run(make_node: Callable[[], RobotNode]) -> int:
     Returns:
         Exit code: 0 after a signal, 1 if the node could not start or stopped by itself.
     """
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` leaves SIGINT ignored
-        signal.signal(number, signal.default_int_handler)
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        spinner = _Spinner(make_node())
-        try:
-            spinner.ended.wait()
-            return 1
-        except KeyboardInterrupt:
-            return 0
-        finally:
-            for number in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(number, signal.SIG_IGN)
-            spinner.stop()
+        _handle_signals(_interrupt)
+        return _spin_until_signal(make_node)
     except KeyboardInterrupt:
         return 0
     except (LegError, ParameterException) as error:
         print(f"cannot start: {error}", file=sys.stderr, flush=True)
         return 1
     finally:
+        _handle_signals(signal.SIG_IGN)  # until the process ends; the executor gave them back
         rclpy.try_shutdown()
+
+
+def _spin_until_signal(make_node: Callable[[], RobotNode]) -> int:
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    executor = make_executor()
+    _handle_signals(_interrupt)  # the executor took them for itself
+    spinner = _Spinner(executor, make_node())
+    try:
+        spinner.ended.wait()
+        return 1
+    finally:
+        spinner.stop()
+
+
+def _handle_signals(handler: Any) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` leaves SIGINT ignored
+        signal.signal(number, handler)
+
+
+def _interrupt(*_: object) -> None:
+    """Raise a KeyboardInterrupt at the first signal; further ones shall not disturb the end."""
+    _handle_signals(lambda *_: None)
+    raise KeyboardInterrupt
 
 
 class _Spinner:
@@ -333,11 +355,13 @@ class _Spinner:
         ended: Set when the node no longer spins.
     """
 
-    def __init__(self, node: RobotNode) -> None:
+    def __init__(self, executor: Executor, node: RobotNode) -> None:
         self.ended = threading.Event()
         self._node = node
-        self._executor = make_executor()
+        self._executor = executor
         self._executor.add_node(node)
+        gc.collect()
+        gc.freeze()  # to search all that was imported for garbage would hold callbacks up
         self._stopping = False
         self._thread = threading.Thread(target=self._spin, name="spin", daemon=True)
         self._thread.start()
@@ -355,10 +379,12 @@ class _Spinner:
         try:
             while not self._stopping and rclpy.ok():
                 try:
-                    self._executor.spin_once()
+                    # without a time-out an `EventsExecutor` of rclpy 7.1 never wakes up
+                    self._executor.spin_once(timeout_sec=1.0)
                 except Exception:
                     self._node.health.fault("executor", traceback.format_exc(limit=-1))
-                    self._node.get_logger().error(traceback.format_exc())
+                    text = traceback.format_exc()
+                    self._node.log.error("executor", text)
                     time.sleep(0.01)  # a fault that stays must not take the whole processor
         finally:
             self.ended.set()

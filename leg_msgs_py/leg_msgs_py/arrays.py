@@ -24,8 +24,11 @@ def to_field(values: ArrayLike, dtype: Any = np.float64) -> array.array[Any]:
         values: Numbers of any shape; row-major order is kept, whatever the memory layout.
         dtype: Type of the field: float64, uint8 or int32.
     """
-    flat = np.asarray(values, dtype=dtype)
-    return array.array(TYPE_CODES[flat.dtype], flat.tobytes())
+    flat = np.ascontiguousarray(values, dtype=dtype)
+    field = array.array(TYPE_CODES[flat.dtype])
+    if flat.size:  # a view of nothing cannot be cast
+        field.frombytes(flat.data.cast("B"))
+    return field
 
 
 def from_field(field: Any, shape: Sequence[int] = (-1,), dtype: Any = np.float64) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,7 @@ def read_ground(grounds: Grounds, ground: Any, frame: LegFrame) -> Contact:
         UnknownNameError: If it names an unknown ground.
         RequestError: If friction or normal are out of range.
     """
-    normal = _finite("ground.normal", ground.normal)
-    if not normal.any():
-        normal = LEVEL
+    normal = _finite("ground.normal", ground.normal) if any(ground.normal) else LEVEL
     return Contact(_friction(grounds, ground), frame.vectors_to_leg(normal))
 
 
@@ -101,7 +100,6 @@ def _magnitude(field: str, value: float, unit: str) -> float:
 
 
 def _finite(field: str, values: Any) -> FloatArray:
-    array = np.asarray(values, dtype=np.float64)
-    if not np.isfinite(array).all():
-        raise RequestError(f"{field}: got {array.tolist()}; allowed: finite values")
-    return array
+    if not all(map(math.isfinite, values)):
+        raise RequestError(f"{field}: got {list(map(float, values))}; allowed: finite values")
+    return np.array(values, dtype=np.float64)

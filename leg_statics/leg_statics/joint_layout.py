@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.mirrored import without_reflection
 from leg_kinematics.robot import Leg, Robot
 
 
 @dataclass(frozen=True)
 class LegGroup:
-    """Legs that share a mechanism and whose joints are all in the message.
+    """Legs of one geometry, mirrored or not, whose joints are all in the message.
 
     Attributes:
-        mechanism: Their mechanism.
+        mechanism: Their mechanism, without reflection.
         legs: Names of the legs (L).
         columns: Where their joints stand in the message (L, n).
+        signs: Signs of the components of vectors, which tell mirrored legs (L, 3).
+        lower: Least efforts (L, n) [N.m or N].
+        upper: Greatest efforts (L, n) [N.m or N].
     """
 
     mechanism: Mechanism
     legs: tuple[str, ...]
     columns: NDArray[np.intp]
+    signs: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
 @dataclass(frozen=True)
@@ -34,36 +40,44 @@ class JointLayout:
     """What a message with certain joint names tells about a robot.
 
     Attributes:
-        repeated: Names that appear more than once; such a message cannot be used.
-        groups: The legs that it updates, by mechanism.
+        groups: The legs that it updates, by geometry.
+        legs: Names of these legs, in the order of the robot (L).
+        order: Where each of them stands among the legs of all groups (L).
         missing: Joints missing of legs of which it has some joints, by leg.
     """
 
-    repeated: tuple[str, ...]
     groups: tuple[LegGroup, ...]
+    legs: tuple[str, ...]
+    order: tuple[int, ...]
     missing: dict[str, tuple[str, ...]]
 
 
 def joint_layout(robot: Robot, names: Sequence[str]) -> JointLayout:
     """Return where the joints of the robot's legs stand among `names`, ignoring other names."""
-    repeated = tuple(name for name, count in Counter(names).items() if count > 1)
     column = {name: k for k, name in enumerate(names)}
-    grouped: dict[Any, list[Leg]] = {}
+    grouped: dict[Mechanism, list[Leg]] = {}
     missing = {}
     for leg in robot.legs.values():
         if leg.mechanism.task_coordinates != ("x", "y", "z"):
             continue  # a manipulator has no foot that bears a load
         absent = tuple(joint for joint in leg.joint_names if joint not in column)
         if not absent:
-            grouped.setdefault(leg.mechanism, []).append(leg)
+            grouped.setdefault(without_reflection(leg.mechanism)[0], []).append(leg)
         elif len(absent) < len(leg.joint_names):
             missing[leg.name] = absent
-    groups = tuple(
-        LegGroup(
-            mechanism,
-            tuple(leg.name for leg in legs),
-            np.array([[column[joint] for joint in leg.joint_names] for leg in legs]),
-        )
-        for mechanism, legs in grouped.items()
+    groups = tuple(_leg_group(mechanism, legs, column) for mechanism, legs in grouped.items())
+    present = [leg for group in groups for leg in group.legs]
+    legs = tuple(name for name in robot.legs if name in present)
+    return JointLayout(groups, legs, tuple(present.index(name) for name in legs), missing)
+
+
+def _leg_group(mechanism: Mechanism, legs: Sequence[Leg], column: dict[str, int]) -> LegGroup:
+    limits = np.array([leg.effort_limits for leg in legs])
+    return LegGroup(
+        mechanism=mechanism,
+        legs=tuple(leg.name for leg in legs),
+        columns=np.array([[column[joint] for joint in leg.joint_names] for leg in legs]),
+        signs=np.array([without_reflection(leg.mechanism)[1] for leg in legs]),
+        lower=np.ascontiguousarray(limits[..., 0]),
+        upper=np.ascontiguousarray(limits[..., 1]),
     )
-    return JointLayout(repeated, groups, missing)

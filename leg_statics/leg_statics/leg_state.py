@@ -1,33 +1,47 @@
-"""The state of legs at their present joint positions."""
+"""The state of legs at given joint positions: where the feet are and what they can carry."""
+
+# The compiler infers the types of the kernel below; only what Python calls is annotated.
+# mypy: allow-untyped-defs, allow-untyped-calls
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, StatusArray, as_array
-from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.arrays import FloatArray, StatusArray
+from leg_kinematics.conditioning import condition_of_point
+from leg_kinematics.kernel import kernel
+from leg_kinematics.mechanism import forward_with_jacobians
 from leg_kinematics.status import Status
-from leg_statics.capacity import load_capacity
-from leg_statics.efforts import utilisation
-from leg_statics.indices import evaluate_indices, supported_indices
+from leg_statics.capacity import capacity_of_point
+from leg_statics.efforts import utilisation_of_point
+from leg_statics.indices import force_slopes
+from leg_statics.joint_layout import LegGroup
+
+OK = int(Status.OK)
+LEVEL = np.array([0.0, 0.0, 1.0])
 
 
 class LegStates(NamedTuple):
-    """State of L legs with the same mechanism.
+    """State of L legs, at one moment or at many.
 
     Attributes:
-        status: `Status` of the present poses (L,).
-        foot_position: Feet in the leg frames (L, 3) [m]; NaN where there is no pose.
-        foot_velocity: Their velocities (L, 3) [m/s]; NaN if the joints' are not known.
-        condition_number: Condition number of the Jacobian (L,); NaN where status is not OK.
-        load_capacity: Greatest vertical ground reaction (L,) [N]; NaN where status is not OK.
-        rated_friction: mu_e (L,); NaN where status is not OK or the mechanism has none.
-        utilisation: Largest effort / effort limit (L,); NaN if the efforts are not known.
+        legs: Names of the legs (L).
+        joint_positions: Actuated joints, one array (..., n) a leg [rad or m].
+        status: `Status` of the poses (..., L).
+        foot_position: Feet in the leg frames (..., L, 3) [m]; NaN where there is no pose.
+        foot_velocity: Their velocities (..., L, 3) [m/s]; NaN if the joints' are not known.
+        condition_number: Condition number of the Jacobian (..., L); NaN where status is not OK, or
+            if the Jacobian is not square.
+        load_capacity: Greatest vertical ground reaction (..., L) [N]; NaN where status is not OK.
+        rated_friction: mu_e (..., L); NaN as the condition number.
+        utilisation: Largest effort / effort limit (..., L); NaN if the efforts are not known.
     """
 
+    legs: tuple[str, ...]
+    joint_positions: tuple[FloatArray, ...]
     status: StatusArray
     foot_position: FloatArray
     foot_velocity: FloatArray
@@ -38,52 +52,77 @@ class LegStates(NamedTuple):
 
 
 def leg_states(
-    mechanism: Mechanism,
-    joint_positions: ArrayLike,
-    effort_limits: ArrayLike,
+    group: LegGroup,
     friction: float,
-    joint_velocities: ArrayLike | None = None,
-    joint_efforts: ArrayLike | None = None,
+    joint_positions: FloatArray,
+    joint_velocities: FloatArray,
+    joint_efforts: FloatArray,
 ) -> LegStates:
-    """Return the state of legs that share a mechanism.
+    """Return the states of the legs of a group, in one pass over the kinematics and the statics.
 
     Args:
-        mechanism: The mechanism of all these legs.
-        joint_positions: Actuated joints (L, n) [rad or m].
-        effort_limits: Least and greatest efforts of each leg's joints (L, n, 2) [N.m or N].
-        friction: Friction coefficient of the ground for the load capacity.
-        joint_velocities: Joint velocities (L, n) [rad/s or m/s]; None if not known.
-        joint_efforts: Present joint efforts (L, n) [N.m or N]; None if not known.
-
-    Raises:
-        ShapeError: If shapes do not fit.
-        ValueRangeError: If friction is negative or NaN.
+        group: L legs with n joints.
+        friction: Friction coefficient of the ground for the load capacity, >= 0.
+        joint_positions: Actuated joints (..., L, n) [rad or m].
+        joint_velocities: Joint velocities (..., L, n) [rad/s or m/s]; NaN if not known.
+        joint_efforts: Present joint efforts (..., L, n) [N.m or N]; NaN if not known.
     """
-    n = len(mechanism.joints)
-    posture = mechanism.forward(joint_positions)
-    limits = as_array("effort_limits", effort_limits, n, 2)
-    jacobian = mechanism.jacobian(posture)[..., :3, :]  # a manipulator turns as well: leave it out
-    bad = posture.status != Status.OK
-    unknown: FloatArray = np.full(len(bad), np.nan)
-
-    velocity: FloatArray = np.full((len(bad), 3), np.nan)
-    if joint_velocities is not None:
-        rates = as_array("joint_velocities", joint_velocities, n)
-        velocity = np.einsum("...in,...n->...i", jacobian, rates)
-    used: FloatArray = unknown
-    if joint_efforts is not None:
-        efforts = as_array("joint_efforts", joint_efforts, n)
-        used, _ = utilisation(efforts, limits)
-
-    names = set(supported_indices(mechanism)) & {"condition_number", "rated_friction"}
-    indices = {name: evaluate_indices(mechanism, posture, [name])[1][..., 0] for name in names}
-    capacity = load_capacity(jacobian, limits[..., 0], limits[..., 1], friction).capacity
+    posture, jacobian, _ = forward_with_jacobians(group.mechanism, joint_positions)
+    bias = np.zeros(len(group.mechanism.joints))  # the leg's own weight is ignored
+    velocity, condition, capacity, mu_e, used = _leg_states(
+        jacobian,
+        posture.status,
+        group.lower,
+        group.upper,
+        bias,
+        friction,
+        LEVEL,
+        joint_velocities,
+        joint_efforts,
+    )
     return LegStates(
+        legs=group.legs,
+        joint_positions=tuple(np.moveaxis(joint_positions, -2, 0)),
         status=posture.status,
-        foot_position=posture.foot_position[..., :3],
-        foot_velocity=velocity,
-        condition_number=indices.get("condition_number", unknown),
-        load_capacity=np.where(bad, np.nan, capacity),
-        rated_friction=indices.get("rated_friction", unknown),
+        foot_position=group.signs * posture.foot_position,
+        foot_velocity=group.signs * velocity,
+        condition_number=condition,
+        load_capacity=capacity,
+        rated_friction=mu_e,
         utilisation=used,
     )
+
+
+@kernel(
+    "(d,n),(),(n),(n),(n),(),(d),(n),(n)->(d),(),(),(),()",
+    "f8[:,:], u1, f8[:], f8[:], f8[:], f8, f8[:], f8[:], f8[:],f8[:], f8[:], f8[:], f8[:], f8[:]",
+)
+def _leg_states(
+    jacobian,
+    status,
+    lower,
+    upper,
+    bias,
+    friction,
+    normal,
+    rates,
+    efforts,
+    velocity,
+    condition,
+    capacity,
+    mu_e,
+    used,
+):
+    """One leg without reflection; what is reflected is its velocity only."""
+    for i in range(3):
+        velocity[i] = 0.0
+        for k in range(len(rates)):
+            velocity[i] += jacobian[i, k] * rates[k]
+    used[0], _ = utilisation_of_point(efforts, lower, upper)
+    condition[0], capacity[0], mu_e[0] = math.nan, math.nan, math.nan
+    if status != OK:
+        return
+    capacity[0] = capacity_of_point(jacobian, lower, upper, bias, friction, normal)
+    if len(rates) == 3:
+        condition[0] = condition_of_point(jacobian)
+        mu_e[0] = abs(force_slopes(jacobian)[1])

@@ -12,24 +12,24 @@ from typing import Any
 
 import numpy as np
 from leg_msgs.action import ComputeIndexMap
-from leg_msgs.msg import EffortLimits, ErrorCode
+from leg_msgs.msg import EffortLimits
 from leg_msgs.srv import GetIndexMap
 from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.clouds import to_cloud
-from rclpy.action import ActionServer, CancelResponse
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
 from leg_kinematics.mechanism import Posture
-from leg_kinematics.requests import LegFrame, RequestError, check_count, error_code, find_frame
+from leg_kinematics.requests import LegFrame, RequestError, check_count, find_frame
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.robot_node import RobotNode, run
 from leg_kinematics.status import Status
 from leg_statics.contacts import declare_grounds, read_ground
 from leg_statics.footholds import Contact
+from leg_statics.goal_queue import GoalQueue
 from leg_statics.map_jobs import MapJob, MapKey, MapMemory
 from leg_statics.maps import IndexMap, find_layer, grid_shape, supported_layers
 from leg_statics.markers import (
@@ -43,19 +43,48 @@ from leg_statics.warm_up import warm_up_statics
 
 AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-FEEDBACK_PERIOD = 0.1  # s
-RESULT_TIMEOUT = 60  # the result of a goal is kept that long [s]
-MOST_GOALS = 16  # that wait or are worked off
 
 
 @dataclass(frozen=True)
-class _Goal:
-    """A goal of the action that is worked off."""
+class _MapWork:
+    """A map of a whole workspace that a goal has ordered."""
 
-    handle: Any
+    node: MapsNode
     leg: Leg
     frame: LegFrame
+    frame_id: str
     job: MapJob
+
+    def feedback(self) -> Any:
+        """Return how far the map is."""
+        progress = self.job.progress
+        positions: FloatArray = self.frame.points_from_leg(progress.best_positions)
+        return ComputeIndexMap.Feedback(
+            fraction=progress.fraction,
+            elapsed=progress.elapsed,
+            remaining=progress.remaining,
+            layers=list(progress.layers),
+            best=to_field(progress.best),
+            best_positions=to_field(positions),
+        )
+
+    def result(self) -> Any:
+        """Return the map, or what there is of it."""
+        progress, index_map = self.job.progress, self.job.index_map
+        if self.job.complete and index_map is not None:
+            self.node.publish_map(self.leg, index_map)
+        result = ComputeIndexMap.Result(
+            fraction=progress.fraction,
+            elapsed=progress.elapsed,
+            layers=list(progress.layers),
+            units=[find_layer(name).unit for name in progress.layers],
+            cloud=self.node.cloud(self.frame_id, self.frame, index_map),
+        )
+        if not self.job.complete:
+            result.error.message = (
+                f"cancelled by the caller after {100.0 * progress.fraction:.0f} % of the map"
+            )
+        return result
 
 
 class MapsNode(RobotNode):
@@ -66,30 +95,18 @@ class MapsNode(RobotNode):
         self._declare_parameters()
         self._grounds = declare_grounds(self)
         self._memory = MapMemory(int(1e6 * self.value("map_memory")))
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="maps")
-        self._goals: dict[bytes, _Goal] = {}
         self._limits: Any = None
         self._postures: dict[str, Posture] = {}
         self._workspaces: list[Any] = []
         self._drawn_at = -np.inf
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
-        self._goal_timer = self.create_timer(FEEDBACK_PERIOD, self._attend_goals)
-        self._goal_timer.cancel()
         self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
-        self.create_subscription(
-            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
-        )
+        self.listen(JointState, "joint_states", self.joint_states)
         self.add_post_set_parameters_callback(lambda parameters: self._draw())
         self.robot_changed()
-        self._action = ActionServer(
-            self,
-            ComputeIndexMap,
-            "~/compute_index_map",
-            execute_callback=lambda handle: None,  # every goal is given its own
-            handle_accepted_callback=self._accept_goal,
-            cancel_callback=self._cancel_goal,
-            result_timeout=RESULT_TIMEOUT,
+        self._queue = GoalQueue(
+            self, ComputeIndexMap, "compute_index_map", "maps", self._begin, self._failure
         )
         self.serve(GetIndexMap, "get_index_map", self.get_index_map)
         self.announce()
@@ -119,10 +136,7 @@ class MapsNode(RobotNode):
 
     def destroy_node(self) -> None:
         """End the map under way, then destroy the node."""
-        for goal in self._goals.values():
-            goal.job.cancel()
-        self._pool.shutdown(wait=True, cancel_futures=True)
-        self._action.destroy()
+        self._queue.destroy()
         super().destroy_node()
 
     def warm_up(self, robot: Robot) -> None:
@@ -181,7 +195,7 @@ class MapsNode(RobotNode):
         response.units = [find_layer(name).unit for name in plane.layers]
         response.values = to_field(plane.values)
         response.status = to_field(plane.status, np.uint8)
-        self._publish_map(leg, plane)
+        self.publish_map(leg, plane)
 
     def _key(self, leg: Leg, request: Any, frame: LegFrame, height: float | None) -> MapKey:
         """Return the key of the map that a request asks for.
@@ -204,7 +218,7 @@ class MapsNode(RobotNode):
             contact,
         )
 
-    def _cloud(self, frame_id: str, frame: LegFrame, index_map: IndexMap | None) -> Any:
+    def cloud(self, frame_id: str, frame: LegFrame, index_map: IndexMap | None) -> Any:
         """Return the points of a map within the workspace as a cloud."""
         if index_map is None:
             return to_cloud(self.header(frame_id), np.empty((0, 3)), {})
@@ -214,94 +228,27 @@ class MapsNode(RobotNode):
         points = frame.points_from_leg(grid_points(index_map)[inside])
         return to_cloud(self.header(frame_id), points, columns)
 
-    def _publish_map(self, leg: Leg, index_map: IndexMap) -> None:
+    def publish_map(self, leg: Leg, index_map: IndexMap) -> None:
+        """Publish a map in the base frame."""
         base = self.robot.base_frame
-        self._map_publisher.publish(self._cloud(base, find_frame(self.robot, leg, base), index_map))
+        self._map_publisher.publish(self.cloud(base, find_frame(self.robot, leg, base), index_map))
 
     # ------------------------------------------------------------------ the action
 
-    # The executor has one thread, and a coroutine that waits would keep it busy. So goals wait in a
-    # table, their maps are computed in another thread that knows nothing of ROS, and a timer tells
-    # the progress and ends them.
+    def _begin(self, request: Any, pool: ThreadPoolExecutor) -> _MapWork:
+        """Order the map of a goal.
 
-    def _accept_goal(self, handle: Any) -> None:
-        """Begin a goal; one that cannot be carried out is ended with the reason."""
-        try:
-            self._goals[bytes(handle.goal_id.uuid)] = self._begin(handle)
-            self._goal_timer.reset()
-        except Exception as error:
-            refusal = self._refusal(error)
-            handle.execute(lambda handle: self._abort(handle, refusal))
-
-    def _begin(self, handle: Any) -> _Goal:
-        request = handle.request
+        Raises:
+            LegError: If it cannot be computed.
+        """
         leg = self.robot.leg(request.leg)
         frame = find_frame(self.robot, leg, request.header.frame_id)
         key = self._key(leg, request, frame, None)
         unknown = set(request.layers) - set(supported_layers(leg.mechanism))
         if unknown:
             raise UnknownNameError("layer", unknown.pop(), supported_layers(leg.mechanism))
-        if len(self._goals) >= MOST_GOALS:
-            raise RequestError(
-                f"goal: {len(self._goals)} maps are waiting; allowed: {MOST_GOALS}",
-                ErrorCode.TOO_LARGE,
-            )
-        return _Goal(handle, leg, frame, MapJob(key, self._memory, self._pool))
-
-    def _refusal(self, error: Exception) -> ErrorCode:
-        """Record what was raised, and return it for a result."""
-        message = self._failure("compute_index_map", error)
-        return ErrorCode(code=error_code(error), message=message)
-
-    def _abort(self, handle: Any, error: ErrorCode) -> Any:
-        handle.abort()
-        return ComputeIndexMap.Result(error=error)
-
-    def _cancel_goal(self, handle: Any) -> CancelResponse:
-        goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is None:
-            return CancelResponse.REJECT
-        goal.job.cancel()
-        return CancelResponse.ACCEPT
-
-    def _attend_goals(self) -> None:
-        """Tell how far the goals are, and end those that are over."""
-        for key, goal in list(self._goals.items()):
-            goal.handle.publish_feedback(_feedback(goal))
-            if goal.job.over:
-                del self._goals[key]
-                goal.handle.execute(lambda handle, goal=goal: self._finish_goal(goal))
-        if not self._goals:
-            self._goal_timer.cancel()
-
-    def _finish_goal(self, goal: _Goal) -> Any:
-        """Return the result of a goal that is over."""
-        with self.health.timed():
-            try:
-                goal.job.check()
-            except Exception as error:
-                return self._abort(goal.handle, self._refusal(error))
-            index_map, progress = goal.job.index_map, goal.job.progress
-            result = ComputeIndexMap.Result(
-                fraction=progress.fraction,
-                elapsed=progress.elapsed,
-                layers=list(progress.layers),
-                units=[find_layer(name).unit for name in progress.layers],
-                cloud=self._cloud(
-                    goal.handle.request.header.frame_id or goal.leg.frame, goal.frame, index_map
-                ),
-            )
-            if goal.job.complete and index_map is not None:
-                result.error.code = ErrorCode.SUCCESS
-                self._publish_map(goal.leg, index_map)
-                goal.handle.succeed()
-            else:
-                result.error.code = ErrorCode.CANCELLED
-                result.error.message = (
-                    f"cancelled by the caller after {100.0 * progress.fraction:.0f} % of the map"
-                )
-                goal.handle.canceled()
-            return result
+        job = MapJob(key, self._memory, pool)
+        return _MapWork(self, leg, frame, request.header.frame_id or leg.frame, job)
 
     # ------------------------------------------------------------------ markers
 
@@ -312,10 +259,6 @@ class MapsNode(RobotNode):
             return
         if not self._marker_publisher.get_subscription_count():
             return
-        self.health.received += 1
-        self._attend("joint_states", lambda: self._move_legs(message))
-
-    def _move_legs(self, message: Any) -> None:
         if len(message.position) != len(message.name):
             raise RequestError(
                 f"position: got {len(message.position)} values; allowed: {len(message.name)}, one "
@@ -373,19 +316,6 @@ class MapsNode(RobotNode):
                 work()
             except Exception as error:
                 self._failure(source, error)
-
-
-def _feedback(goal: _Goal) -> Any:
-    progress = goal.job.progress
-    positions: FloatArray = goal.frame.points_from_leg(progress.best_positions)
-    return ComputeIndexMap.Feedback(
-        fraction=progress.fraction,
-        elapsed=progress.elapsed,
-        remaining=progress.remaining,
-        layers=list(progress.layers),
-        best=to_field(progress.best),
-        best_positions=to_field(positions),
-    )
 
 
 def main() -> int:

@@ -19,29 +19,30 @@ from leg_msgs.srv import (
     SetEffortLimits,
 )
 from leg_msgs_py.arrays import from_field, to_field
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import NotSupportedError, UnknownNameError
 from leg_kinematics.mechanism import SI_UNITS, Posture, geometry_parameters
 from leg_kinematics.requests import RequestError, check_count, find_frame, read_rows
 from leg_kinematics.robot import Leg, Robot
-from leg_kinematics.robot_node import LOG_PERIOD, RobotNode, run
+from leg_kinematics.robot_node import STREAM_QOS, RobotNode, run
 from leg_kinematics.status import Status
 from leg_statics.contacts import declare_grounds, read_bias, read_contact
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.footholds import evaluate_footholds
 from leg_statics.indices import INDICES, evaluate_indices, supported_indices
-from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
-from leg_statics.leg_state import leg_states
+from leg_statics.joint_layout import JointLayout
+from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStream, StampOrder
+from leg_statics.leg_state import LegStates as States
 from leg_statics.step_requests import fill_step_length
 from leg_statics.warm_up import warm_up_statics
 
 AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-KNOWN_LAYOUTS = 64  # kinds of joint state messages remembered
 
 
 class StaticsNode(RobotNode):
@@ -65,14 +66,13 @@ class StaticsNode(RobotNode):
             (1, 100_000),
         )
         self._grounds = declare_grounds(self)
-        self._layouts: dict[tuple[str, ...], JointLayout] = {}
+        self._stamps = StampOrder()
         self._published_at: dict[tuple[str, ...], float] = {}
         self._limits_publisher = self.create_publisher(EffortLimits, "~/effort_limits", LATCHED)
-        self._states_publisher = self.create_publisher(LegStates, "~/leg_states", 10)
+        self._states_publisher = self.create_publisher(LegStates, "~/leg_states", STREAM_QOS.depth)
         self.robot_changed()
-        self.create_subscription(
-            JointState, "joint_states", self.joint_states, qos_profile_sensor_data
-        )
+        self.add_post_set_parameters_callback(lambda parameters: self._renew_stream())
+        self.listen(JointState, "joint_states", self.joint_states)
         self.serve(ComputeEfforts, "compute_efforts", self.compute_efforts)
         self.serve(EvaluateIndices, "evaluate_indices", self.evaluate_indices)
         self.serve(
@@ -90,7 +90,7 @@ class StaticsNode(RobotNode):
 
     def robot_changed(self) -> None:
         """Forget what was derived from the old description and publish the new limits."""
-        self._layouts.clear()
+        self._renew_stream()
         self._published_at.clear()
         self.health.notes.clear()
         self._publish_limits()
@@ -177,6 +177,7 @@ class StaticsNode(RobotNode):
         limits[_joint_rows(leg, request.joint_names)] = _new_limits(request)
         legs = {**self.robot.legs, leg.name: replace(leg, effort_limits=limits)}
         self.robot = replace(self.robot, legs=legs)
+        self._renew_stream()
         self._publish_limits()
 
     def _fill_legs(self, response: Any) -> None:
@@ -221,101 +222,76 @@ class StaticsNode(RobotNode):
 
     def joint_states(self, message: Any) -> None:
         """Publish the states of all legs whose joints are in the message."""
-        self.health.received += 1
-        with self.health.timed():
-            try:
-                self._publish_states(message)
-            except Exception as error:
-                self._failure("joint_states", error)
-
-    def _publish_states(self, message: Any) -> None:
-        names = tuple(message.name)
-        layout = self._layout(names)
-        _check_joint_states(message, layout)
-        self._note_missing(layout)
-        if not layout.groups or self._too_soon(names):
+        names, stamp = tuple(message.name), message.header.stamp
+        if not self._stamps.advances(names, 10**9 * stamp.sec + stamp.nanosec):
+            self.health.disorder("joint_states")
+        self._note_missing(self._stream.layout(names))
+        now = time.monotonic()
+        if now - self._published_at.get(names, -np.inf) < self._least_period:
             return
-        states = {
-            leg: state for group in layout.groups for leg, state in self._states(group, message)
-        }
-        self._states_publisher.publish(
-            LegStates(
-                header=type(message.header)(
-                    stamp=message.header.stamp, frame_id=self.robot.base_frame
-                ),
-                legs=[states[leg] for leg in self.robot.legs if leg in states],
-            )
+        states = self._stream.read(
+            names,
+            from_field(message.position),
+            from_field(message.velocity),
+            from_field(message.effort),
         )
+        if not states.legs:
+            return
+        filled = self._states_message(states)
+        filled.header.stamp = stamp
+        self._states_publisher.publish(filled)
+        if len(self._published_at) >= KNOWN_LAYOUTS:  # a stream whose names keep changing
+            self._published_at.clear()
+        self._published_at[names] = now
 
-    def _layout(self, names: tuple[str, ...]) -> JointLayout:
-        if names not in self._layouts:
-            if len(self._layouts) >= KNOWN_LAYOUTS:  # a stream whose names keep changing
-                self._layouts.clear()
-                self._published_at.clear()
-            self._layouts[names] = joint_layout(self.robot, names)
-        return self._layouts[names]
+    def _renew_stream(self) -> None:
+        """Take up the robot, its limits and the parameters of the stream."""
+        self._stream = JointStream(self.robot, self.value("friction_coefficient"))
+        rate = self.value("state_rate_limit")
+        self._least_period = 1.0 / rate if rate > 0.0 else 0.0
+        self._messages: dict[tuple[str, ...], LegStates] = {}
 
     def _note_missing(self, layout: JointLayout) -> None:
-        for group in layout.groups:
-            for leg in group.legs:
-                self.health.notes.pop(f"leg not updated: {leg}", None)
+        for leg in layout.legs:
+            self.health.notes.pop(f"leg not updated: {leg}", None)
         for leg, joints in layout.missing.items():
             text = f"{leg} is not updated: joint_states lack {', '.join(joints)}"
             self.health.notes[f"leg not updated: {leg}"] = text
-            self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+            self.log.warning(f"{leg} not updated", text)
 
-    def _too_soon(self, names: tuple[str, ...]) -> bool:
-        """Tell whether the last states from such a message are too young for the rate limit."""
-        limit, now = self.value("state_rate_limit"), time.monotonic()
-        if limit > 0.0 and now - self._published_at.get(names, -np.inf) < 1.0 / limit:
-            return True
-        self._published_at[names] = now
-        return False
+    def _states_message(self, states: States) -> LegStates:
+        """Return the message of leg states; it is filled anew each time, since making one is dear.
 
-    def _states(self, group: LegGroup, message: Any) -> list[tuple[str, LegState]]:
-        """Return the states of the legs of one mechanism, computed as one batch."""
-
-        def rows(values: Any) -> FloatArray:
-            return from_field(values)[group.columns]
-
-        positions = rows(message.position)
-        states = leg_states(
-            group.mechanism,
-            positions,
-            [self.robot.legs[leg].effort_limits for leg in group.legs],
-            self.value("friction_coefficient"),
-            rows(message.velocity) if message.velocity else None,
-            rows(message.effort) if message.effort else None,
-        )
-        return [
-            (
-                leg,
-                LegState(
-                    leg=leg,
-                    status=int(states.status[k]),
-                    joint_positions=to_field(positions[k]),
-                    foot_position=states.foot_position[k],
-                    foot_velocity=states.foot_velocity[k],
-                    condition_number=float(states.condition_number[k]),
-                    load_capacity=float(states.load_capacity[k]),
-                    rated_friction=float(states.rated_friction[k]),
-                    utilisation=float(states.utilisation[k]),
-                ),
+        A publisher is done with a message when `publish` returns.
+        """
+        if states.legs not in self._messages:
+            self._messages[states.legs] = LegStates(
+                header=Header(frame_id=self.robot.base_frame),
+                legs=[LegState(leg=leg) for leg in states.legs],
             )
-            for k, leg in enumerate(group.legs)
-        ]
-
-
-def _check_joint_states(message: Any, layout: JointLayout) -> None:
-    """Raise a RequestError if a message cannot be used."""
-    if layout.repeated:
-        raise RequestError(f"name: {', '.join(layout.repeated)} appear more than once")
-    count = len(message.name)
-    for field, may_be_empty in (("position", False), ("velocity", True), ("effort", True)):
-        length = len(getattr(message, field))
-        if length != count and not (length == 0 and may_be_empty):
-            allowed = f"{count} values, one a name" + (", or none" if may_be_empty else "")
-            raise RequestError(f"{field}: got {length} values; allowed: {allowed}")
+        message = self._messages[states.legs]
+        rows = zip(
+            message.legs,
+            states.joint_positions,
+            states.status.tolist(),
+            states.foot_position,
+            states.foot_velocity,
+            states.condition_number.tolist(),
+            states.load_capacity.tolist(),
+            states.rated_friction.tolist(),
+            states.utilisation.tolist(),
+            strict=True,
+        )
+        for leg, joints, status, foot, velocity, condition, capacity, friction, used in rows:
+            leg.joint_positions = to_field(joints)
+            leg.status = status
+            leg.foot_position = foot
+            leg.foot_velocity = velocity
+            leg.condition_number = condition
+            leg.load_capacity = capacity
+            leg.rated_friction = friction
+            leg.utilisation = used
+        return message
 
 
 def _vectors(field: str, values: Any, count: int) -> FloatArray:

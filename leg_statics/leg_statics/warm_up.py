@@ -6,12 +6,14 @@ import numpy as np
 
 from leg_kinematics.robot import Robot
 from leg_statics.capacity import load_capacity
+from leg_statics.efforts import utilisation
 from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices
+from leg_statics.joint_stream import JointStream
 
 
 def warm_up_statics(robot: Robot) -> None:
-    """Call indices, load capacity and footholds of every leg once."""
+    """Call indices, load capacity, footholds and the state of every leg once."""
     for leg in robot.legs.values():
         posture = leg.mechanism.initial_posture
         evaluate_indices(leg.mechanism, posture)
@@ -21,3 +23,7 @@ def warm_up_statics(robot: Robot) -> None:
             feet = np.tile(posture.foot_position, (2, 1))
             contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
             evaluate_footholds(leg.mechanism, leg.effort_limits, feet, contact)
+            utilisation(lower, leg.effort_limits)
+    joints = [leg.mechanism.initial_posture.joint_positions for leg in robot.legs.values()]
+    names, _ = robot.effort_limits()
+    JointStream(robot, friction=0.4).read(names, np.concatenate(joints))

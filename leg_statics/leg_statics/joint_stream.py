@@ -1,0 +1,169 @@
+"""Joint states in, leg states out: the same for a live stream and for a recording.
+
+A stream is made for a robot with the limits in force, and reads one message or many at once:
+
+    stream = JointStream(robot, friction=0.4)
+    states = stream.read(names, position, velocity, effort)   # one message: (N,) each
+    states = stream.read(names, positions, velocities, efforts)   # T messages: (T, N) each
+    states.load_capacity   # (..., L) of the L legs named in `states.legs`
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_kinematics.arrays import FloatArray, as_array, as_non_negative
+from leg_kinematics.errors import LegError
+from leg_kinematics.robot import Robot
+from leg_statics.capacity import check_effort_limits
+from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
+from leg_statics.leg_state import LegStates, leg_states
+
+KNOWN_LAYOUTS = 64  # kinds of joint state messages remembered
+
+
+class JointStateError(LegError, ValueError):
+    """A joint state message that cannot be used."""
+
+
+class JointStream:
+    """Turns joint states into the states of the legs whose joints they name.
+
+    Joints are found by name, in any order; joints of no leg are ignored. What depends on the names
+    and on the robot only is worked out once for each tuple of names.
+
+    Args:
+        robot: The robot, with the effort limits in force.
+        friction: Friction coefficient of the ground for the load capacity.
+
+    Raises:
+        ValueRangeError: If the friction is negative or NaN, or limits are NaN or reversed.
+    """
+
+    def __init__(self, robot: Robot, friction: float) -> None:
+        self.robot = robot
+        self.friction = float(as_non_negative("friction", friction))
+        _, limits = robot.effort_limits()
+        check_effort_limits(limits[:, 0], limits[:, 1])
+        self._layouts: dict[tuple[str, ...], JointLayout] = {}
+
+    def layout(self, names: Sequence[str]) -> JointLayout:
+        """Return which legs a message with these joint names updates, and which lack joints.
+
+        Raises:
+            JointStateError: If a name appears more than once.
+        """
+        names = tuple(names)
+        known = self._layouts.get(names)
+        if known is not None:
+            return known
+        repeated = [name for name, count in Counter(names).items() if count > 1]
+        if repeated:
+            raise JointStateError(f"name: {', '.join(repeated)} appear more than once")
+        if len(self._layouts) >= KNOWN_LAYOUTS:  # a stream whose names keep changing
+            self._layouts.clear()
+        self._layouts[names] = joint_layout(self.robot, names)
+        return self._layouts[names]
+
+    def read(
+        self,
+        names: Sequence[str],
+        position: ArrayLike,
+        velocity: ArrayLike = (),
+        effort: ArrayLike = (),
+    ) -> LegStates:
+        """Return the states of all legs whose joints are named, in the order of the robot.
+
+        Args:
+            names: Names of N joints.
+            position: Joint positions (..., N) [rad or m].
+            velocity: Joint velocities (..., N) [rad/s or m/s]; empty if not known.
+            effort: Joint efforts (..., N) [N.m or N]; empty if not known.
+
+        Returns:
+            States with the batch axes of the position; `legs` is empty if there is none to update.
+            A leg with a position that is not finite has the status INVALID_INPUT.
+
+        Raises:
+            JointStateError: If a name appears more than once or a length is wrong.
+        """
+        layout = self.layout(names)
+        fields = [
+            _field("position", position, len(names), may_be_empty=False),
+            _field("velocity", velocity, len(names), may_be_empty=True),
+            _field("effort", effort, len(names), may_be_empty=True),
+        ]
+        parts = [self._group_states(group, *fields) for group in layout.groups]
+        if len(parts) == 1:
+            return parts[0]
+        return _merged(parts, layout, fields[0].shape[:-1])
+
+    def _group_states(
+        self, group: LegGroup, position: FloatArray, velocity: FloatArray, effort: FloatArray
+    ) -> LegStates:
+        return leg_states(
+            group,
+            self.friction,
+            position[..., group.columns],
+            _rows(velocity, group),
+            _rows(effort, group),
+        )
+
+
+class StampOrder:
+    """Watches that the stamps of messages with the same joint names increase."""
+
+    def __init__(self) -> None:
+        self._last: dict[tuple[str, ...], int] = {}
+
+    def advances(self, names: Sequence[str], stamp: int) -> bool:
+        """Tell whether a message is later than the one before it.
+
+        Args:
+            names: Its joint names; messages with others are another stream.
+            stamp: Its time [ns]; 0 if it has none, which is never out of order.
+        """
+        names = tuple(names)
+        if len(self._last) >= KNOWN_LAYOUTS and names not in self._last:
+            self._last.clear()
+        last = self._last.get(names, 0)
+        self._last[names] = stamp
+        return stamp == 0 or stamp > last
+
+
+def _field(name: str, values: ArrayLike, count: int, *, may_be_empty: bool) -> FloatArray:
+    """Return a field of a message as an array (..., count), or (..., 0) if that is allowed."""
+    array = as_array(name, values)
+    length = array.shape[-1] if array.ndim else 1
+    if length != count and not (length == 0 and may_be_empty):
+        allowed = f"{count} values, one a name" + (", or none" if may_be_empty else "")
+        raise JointStateError(f"{name}: got {length} values; allowed: {allowed}")
+    return array
+
+
+def _merged(parts: Sequence[LegStates], layout: JointLayout, batch: tuple[int, ...]) -> LegStates:
+    """Return the states of several groups, or of none, as one in the order of the robot."""
+    nothing = LegStates(
+        (),
+        (),
+        np.empty((*batch, 0), np.uint8),
+        *np.empty((2, *batch, 0, 3)),
+        *np.empty((4, *batch, 0)),
+    )
+    joints = [positions for part in parts for positions in part.joint_positions]
+    arrays = (
+        np.concatenate(fields, axis=len(batch)).take(layout.order, axis=len(batch))
+        for fields in zip(*(part[2:] for part in (nothing, *parts)), strict=True)
+    )
+    return LegStates(layout.legs, tuple(joints[k] for k in layout.order), *arrays)
+
+
+def _rows(values: FloatArray, group: LegGroup) -> FloatArray:
+    """Return the values of the joints of each leg (..., L, n); NaN (n,) if there are none."""
+    if values.shape[-1] == 0:
+        return np.full(group.columns.shape[-1], np.nan)
+    return values[..., group.columns]

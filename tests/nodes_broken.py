@@ -1,0 +1,33 @@
+"""A node whose callbacks fail, and that logs by Python's `logging`; the tests run it."""
+
+import logging
+import sys
+
+from std_srvs.srv import Trigger
+
+from leg_kinematics.robot_node import RobotNode, run
+
+
+class BrokenNode(RobotNode):
+    """Fails in a timer and in a service; answers in another service."""
+
+    def __init__(self):
+        super().__init__("broken")
+        self.create_timer(0.02, self.fail)
+        self.create_service(Trigger, "~/fail", self.fail)
+        self.create_service(Trigger, "~/work", self.work)
+        logging.getLogger("solver").warning("no answer for %d points", 3)
+        self.announce()
+
+    def fail(self, *_):
+        """Fail."""
+        raise ValueError("broken on purpose")
+
+    def work(self, request, response):
+        """Answer how many faults were counted."""
+        response.message = self.health.report().values["internal faults"]
+        return response
+
+
+if __name__ == "__main__":
+    sys.exit(run(BrokenNode))

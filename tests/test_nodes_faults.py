@@ -1,0 +1,76 @@
+"""Faults of a node's own code, and floods of bad input: the node lives on, and its log is short."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from leg_msgs_py.client import LegClient
+from node_processes import NodeProcesses
+from nodes_support import START_TIMEOUT, wait_for
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+BROKEN_NODE = Path(__file__).with_name("nodes_broken.py")
+
+
+@pytest.fixture
+def log(tmp_path):
+    """The file that a node logs to."""
+    return tmp_path / "node.log"
+
+
+def test_callbacks_that_fail_stop_neither_the_node_nor_its_other_services(log):
+    with log.open("w") as stream, LegClient() as client:
+        process = subprocess.Popen([sys.executable, BROKEN_NODE], stderr=stream)
+        try:
+            clients = [client.node.create_client(Trigger, f"/broken/{n}") for n in ("work", "fail")]
+            for service in clients:
+                assert service.wait_for_service(START_TIMEOUT)
+            work, fail = clients
+            for _ in range(3):
+                fail.call_async(Trigger.Request())
+            wait_for(lambda: int(work.call(Trigger.Request(), timeout_sec=20.0).message) > 10)
+        finally:
+            process.send_signal(signal.SIGINT)
+            code = process.wait(20.0)
+    assert code == 0
+    text = log.read_text()
+    assert "ValueError: broken on purpose" in text
+    assert "[WARN]" in text.splitlines()[0]
+    assert "[broken]: solver: no answer for 3 points" in text.splitlines()[0]
+
+
+def test_a_flood_of_bad_messages_is_counted_and_logged_once(log):
+    count = 400
+    with (
+        log.open("w") as stream,
+        NodeProcesses(
+            names=["statics"], namespace="flooded", stderr=stream, stdout=stream
+        ) as nodes,
+        LegClient(namespace="flooded") as client,
+    ):
+        node = client.node
+        publisher = node.create_publisher(
+            JointState, "/flooded/joint_states", qos_profile_sensor_data
+        )
+        wait_for(lambda: publisher.get_subscription_count() == 1, START_TIMEOUT)
+        bad = JointState(name=["a", "a"], position=[0.0, 0.0])
+
+        def is_refused():
+            publisher.publish(bad)
+            return "joint_states refused" in log.read_text()
+
+        wait_for(is_refused)  # the node may know the publisher later than the publisher the node
+        for _ in range(count):
+            publisher.publish(bad)
+        wait_for(lambda: "not logged" in log.read_text())
+        assert nodes.ended() == {}
+    refusals = [line for line in log.read_text().splitlines() if "joint_states refused" in line]
+    assert "name: a appear more than once" in refusals[0]
+    suppressed = [int(n) for line in refusals for n in re.findall(r"(\d+) more", line)]
+    assert len(refusals) <= 3  # a slow machine may take more than one period
+    assert sum(suppressed) > count // 2  # best effort: some may be lost
