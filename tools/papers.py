@@ -14,43 +14,47 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
 import leg_statics.published
-from leg_statics import plot_gantry_example, plot_index_map, synthesize_six_bar
+from leg_statics import plot_gantry_example, plot_index_map, plots, synthesize_six_bar
+from leg_statics.published import paper_000
 from leg_statics.published.comparison import Comparison
 
 COLUMNS = ("item", "paper", "ours", "difference", "verdict", "note")
 
+
+def draw_paper_000(folder: Path) -> None:
+    """Draw what figures 2 and 5 to 8 show, of the leg before and after the optimisation."""
+    plot_index_map.main(["--type", "initial", "--all", str(folder)])
+    plot_index_map.main(["--type", "optimised", "--all", str(folder)])
+    plot_index_map.main(["--figure", "8", "--output", str(folder / "hexapod_both_8.png")])
+    found = paper_000.paper_search()
+    marked = {
+        "initial": found.before,
+        "paper's optimum": found.means[found.find(tuple(paper_000.OPTIMISED_LENGTHS.values()))],
+        "best by (33)": found.means[np.argmax(found.objective)],
+    }
+    figure = plots.plot_designs(found.means[found.known], marked, before=found.before)
+    figure.savefig(folder / "hexapod_initial_7.png", dpi=plot_index_map.RESOLUTION)
+
+
+def draw_paper_001(folder: Path) -> None:
+    """Draw the maps of the quadruped's leg; figures 3 and 4 are those of K_F and K_J."""
+    plot_index_map.main(["--robot", "quadruped", "--all", str(folder)])
+    for name in ("planar_force", "planar_imbalance"):
+        path = folder / f"{name}.png"
+        plot_index_map.main(["--robot", "quadruped", "--index", name, "--output", str(path)])
+
+
 # What draws the figures of a paper into a folder.
 FIGURES: dict[str, Callable[[Path], object]] = {
-    "paper_000": lambda folder: [
-        plot_index_map.main(["--type", "initial", "--all", str(folder)]),
-        plot_index_map.main(["--type", "optimised", "--all", str(folder)]),
-        plot_index_map.main(
-            [
-                "--type",
-                "initial",
-                "--figure",
-                "7",
-                "--output",
-                str(folder / "hexapod_initial_7.png"),
-            ]
-        ),
-        plot_index_map.main(["--figure", "8", "--output", str(folder / "hexapod_both_8.png")]),
-    ],
-    "paper_001": lambda folder: [
-        plot_index_map.main(["--robot", "quadruped", "--all", str(folder)]),
-        *(
-            plot_index_map.main(
-                ["--robot", "quadruped", "--index", name, "--output", str(folder / f"{name}.png")]
-            )
-            for name in ("planar_force", "planar_imbalance")  # figures 3 and 4
-        ),
-    ],
+    "paper_000": draw_paper_000,
+    "paper_001": draw_paper_001,
     "paper_003": lambda folder: synthesize_six_bar.main(["--figures", str(folder)]),
     "paper_004": plot_gantry_example.write_figures,
 }

@@ -425,6 +425,7 @@ def plot_designs(
     means: ArrayLike,
     marked: Mapping[str, ArrayLike] | None = None,
     *,
+    before: ArrayLike | None = None,
     names: Sequence[str] = DESIGN_MEANS,
     title: str = "",
     figure: Figure | None = None,
@@ -436,6 +437,7 @@ def plot_designs(
     Args:
         means: Means of each design (m, 3).
         marked: Means (3,) of designs to mark, by their name.
+        before: Means (3,) that are to be bettered; lines through them bound the designs that do.
         names: Names of the three indices.
         title: Title of the figure.
         figure: Figure to draw into.
@@ -459,6 +461,10 @@ def plot_designs(
         ax.plot(
             k, force, marker, markersize=6, mfc="none", mec="black", mew=1.1, label=name, ls="none"
         )
+    if before is not None:
+        k, force, _ = as_array("before", before, 3)
+        ax.axvline(k, color=GREY, linewidth=0.6, linestyle="--", zorder=0)
+        ax.axhline(force, color=GREY, linewidth=0.6, linestyle="--", zorder=0)
     ax.set_xlabel(_mean_label(names[0]), fontsize=FONT_SIZE)
     ax.set_ylabel(_mean_label(names[1]), fontsize=FONT_SIZE)
     bar = figure.colorbar(dots, ax=ax, aspect=30, pad=0.02)

@@ -210,11 +210,14 @@ def test_heights_of_figure_8_are_one_or_one_a_leg():
 
 def test_designs_are_drawn_where_their_means_are():
     means = np.random.default_rng(0).uniform(1.0, 5.0, (50, 3))
-    figure = plots.plot_designs(means, {"chosen": means[7]})
+    figure = plots.plot_designs(means, {"chosen": means[7]}, before=means[8])
     ax = figure.axes[0]
     np.testing.assert_array_equal(ax.collections[0].get_offsets(), means[:, :2])
     np.testing.assert_array_equal(ax.collections[0].get_array(), means[:, 2])
     np.testing.assert_array_equal(np.ravel(ax.lines[0].get_data()), means[7, :2])
+    upright, level = ax.lines[1:]
+    assert set(upright.get_xdata()) == {means[8, 0]}
+    assert set(level.get_ydata()) == {means[8, 1]}
     written = " ".join(texts(figure))
     for symbol in (r"$k_\mathrm{q}$", r"$\eta_\mathrm{cFq}$", r"$\eta_\mathrm{cMq}$", "chosen"):
         assert symbol in written
