@@ -38,6 +38,7 @@ ENTRIES = {
     "single": "one point a call",
     "jansen": "Jansen's linkage, and pylinkage",
     "maps": "index map of the whole workspace",
+    "searches": "geometry search by worker processes",
     "startup": "import and compilation",
     "growth": "time and memory by number of points",
     "services": "service round trips of the nodes",
@@ -86,14 +87,14 @@ def read_arguments() -> argparse.Namespace:
         "--quick", action="store_true", help="few repeats: see that everything works"
     )
     parser.add_argument(
-        "--soak", metavar="SECONDS", type=float, help="duration of the stream (default: 10)"
+        "--soak", metavar="SECONDS", type=float, help="duration of the stream (default: 60)"
     )
     parser.add_argument(
         "--output", metavar="FILE", type=Path, help="where to save the numbers as JSON"
     )
     arguments = parser.parse_args()
     if arguments.soak is None:
-        arguments.soak = 3.0 if arguments.quick else 10.0
+        arguments.soak = 3.0 if arguments.quick else 60.0
     return arguments
 
 

@@ -15,11 +15,13 @@ methods in its callbacks, and use the blocking ones in other threads only.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from leg_msgs.action import ComputeIndexMap
+from leg_msgs.action import ComputeIndexMap, SearchGeometry
 from leg_msgs.msg import EffortLimits as EffortLimitsMessage
 from leg_msgs.srv import (
     ComputeEfforts,
@@ -52,6 +54,8 @@ from leg_msgs_py.results import (
     JointPositions,
     LegDescription,
     MapProgress,
+    SearchedGeometry,
+    SearchProgress,
     StepLengths,
 )
 from numpy.typing import ArrayLike
@@ -111,6 +115,7 @@ class LegClient:
             for service, service_type in services.items()
         }
         self._map_action = (f"{prefix}/maps/compute_index_map", ComputeIndexMap)
+        self._search_action = (f"{prefix}/designs/search_geometry", SearchGeometry)
         self._effort_limits_topic = f"{prefix}/statics/effort_limits"
         self._caller = Caller(node, timeout, domain_id)
 
@@ -718,6 +723,71 @@ class LegClient:
             )
 
         return send_goal(self._caller, self._map_action, goal, decode, tell)
+
+    # ------------------------------------------------------------------ designs
+
+    def search_geometry(
+        self,
+        study: str | os.PathLike[str],
+        folder: str | os.PathLike[str] = "",
+        *,
+        on_progress: Callable[[SearchProgress], None] = lambda progress: None,
+    ) -> SearchedGeometry:
+        """Search for better dimensions of a leg; the designs node does it.
+
+        The client's timeout does not count for the work, but for the node's silence.
+
+        Args:
+            study: Text of a study file (YAML), or the file's path as a `Path`.
+            folder: Where results go, on the machine of the node; a search of this study that
+                stopped there goes on. "" for a new folder of the node's choice.
+            on_progress: Called in the client's thread now and then; what it raises ends the work.
+        """
+        return self.search_geometry_async(study, folder, on_progress=on_progress).wait()
+
+    def search_geometry_async(
+        self,
+        study: str | os.PathLike[str],
+        folder: str | os.PathLike[str] = "",
+        *,
+        on_progress: Callable[[SearchProgress], None] = lambda progress: None,
+    ) -> GoalFuture[SearchedGeometry]:
+        """Ask as `search_geometry` does; return a future.
+
+        Its `cancel` stops the work; `wait` then raises a `CancelledError` that has what was found
+        until then as its `partial`.
+        """
+        text = study if isinstance(study, str) else Path(study).read_text(encoding="utf-8")
+        goal = SearchGeometry.Goal(study=text, folder=str(folder))
+
+        def decode(result: Any) -> SearchedGeometry:
+            parameters, objectives = tuple(result.parameters), tuple(result.objectives)
+            return SearchedGeometry(
+                parameters,
+                from_field(result.best_parameters, (-1, len(parameters))),
+                objectives,
+                from_field(result.best_objectives, (-1, len(objectives))),
+                result.robot,
+                result.folder,
+                result.evaluated,
+                result.feasible,
+                result.elapsed,
+            )
+
+        def tell(feedback: Any) -> None:
+            on_progress(
+                SearchProgress(
+                    feedback.evaluated,
+                    feedback.total,
+                    feedback.rate,
+                    feedback.elapsed,
+                    feedback.remaining,
+                    tuple(feedback.objectives),
+                    from_field(feedback.best),
+                )
+            )
+
+        return send_goal(self._caller, self._search_action, goal, decode, tell)
 
     # ------------------------------------------------------------------ robot
 

@@ -250,6 +250,54 @@ class MapProgress(NamedTuple):
     best_positions: FloatArray
 
 
+class SearchedGeometry(NamedTuple):
+    """Answer of `search_geometry`: the M designs that no other beats in every objective.
+
+    Attributes:
+        parameters: Names of the dimensions that were varied (P).
+        best_parameters: Dimensions of these designs (M, P) [SI].
+        objectives: Names of the objectives (K).
+        best_objectives: Objectives of these designs (M, K) [SI].
+        robot: Robot description (YAML) with the winner's dimensions; "" if no design is feasible.
+        folder: Where all results are, on the machine of the node.
+        evaluated: Number of designs evaluated.
+        feasible: How many of them can be assembled and keep all constraints.
+        elapsed: Time that the work took [s].
+    """
+
+    parameters: tuple[str, ...]
+    best_parameters: FloatArray
+    objectives: tuple[str, ...]
+    best_objectives: FloatArray
+    robot: str
+    folder: str
+    evaluated: int
+    feasible: int
+    elapsed: float
+
+
+class SearchProgress(NamedTuple):
+    """Progress of `search_geometry`.
+
+    Attributes:
+        evaluated: Designs evaluated so far.
+        total: Designs that will be evaluated.
+        rate: Designs evaluated in a second [1/s].
+        elapsed: Time since the goal was accepted [s].
+        remaining: Estimated time until the end [s]; NaN while it is not known.
+        objectives: Names of the objectives (K).
+        best: Best value of each objective so far (K,); NaN while there is none.
+    """
+
+    evaluated: int
+    total: int
+    rate: float
+    elapsed: float
+    remaining: float
+    objectives: tuple[str, ...]
+    best: FloatArray
+
+
 class EffortLimits(NamedTuple):
     """Effort limits in force of all joints of the robot.
 
