@@ -11,7 +11,7 @@ export AMENT_PREFIX_PATH := $(VENV)
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint typecheck bench bench-compare papers clean
+.PHONY: help setup demo run test lint typecheck soak bench bench-compare papers clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -31,6 +31,9 @@ lint: setup  ## Check style and format
 
 typecheck: setup  ## Check types
 	$(VENV_PYTHON) -m mypy
+
+soak: setup  ## Record a minute at 1 kHz for six legs and count what is lost
+	$(VENV_PYTHON) -m pytest -s tests/soak_recorder.py
 
 bench: setup  ## Measure speed through the public interfaces, and that of other software
 	@echo "Installing what to compare with, unless it is there ..."

@@ -1,0 +1,99 @@
+"""What the tests of the recorder and its soak share: the command as a process, and a sender."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import defaultdict
+from contextlib import contextmanager
+from pathlib import Path
+
+from leg_msgs_py.bags import Bag
+from node_processes import find_executable
+
+SENDER = Path(__file__).with_name("numbered_sender.py")
+LEGS = tuple(f"/leg_{k}/joint_states" for k in range(6))
+STOP_TIMEOUT = 30.0  # [s]
+
+
+class RecordProcess:
+    """The command `record` as a process; afterwards its output and exit code."""
+
+    def __init__(self, folder, *arguments, **environment):
+        self.folder = folder
+        command = [find_executable("leg_msgs_py", "record"), "-o", folder, *arguments]
+        self.process = subprocess.Popen(
+            command,
+            env={**os.environ, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self, number=signal.SIGINT):
+        """End it by a signal, and return its output."""
+        self.process.send_signal(number)
+        return self.wait()
+
+    def wait(self):
+        """Wait until it ends, and return its output."""
+        output, self.errors = self.process.communicate(timeout=STOP_TIMEOUT)
+        return output
+
+    def size(self):
+        """Return how much of the recording is on the disk [B]."""
+        file = self.folder / f"{self.folder.name}.mcap"
+        return file.stat().st_size if file.exists() else 0
+
+    def memory(self):
+        """Return the most memory it has had [MiB]."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(status.split("VmHWM:")[1].split()[0]) / 1024
+
+
+@contextmanager
+def sender(rate, seconds, topics):
+    """Run a sender of numbered joint states."""
+    process = subprocess.Popen(
+        [sys.executable, SENDER, str(rate), str(seconds), *topics],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.stdin.close()
+        process.wait(STOP_TIMEOUT)
+        process.stdout.close()
+
+
+def report_of(process):
+    """Wait until a sender has sent everything, and return what it tells."""
+    return json.loads(process.stdout.readline())
+
+
+def numbers(folder):
+    """Return the numbers of the recorded joint states by topic; not those of the warm-up."""
+    found = defaultdict(list)
+    for message in Bag(folder).messages():
+        if message.topic in LEGS:
+            number = int.from_bytes(message.data[4:8], "little")
+            if number:
+                found[message.topic].append(number)
+    return dict(found)
+
+
+def missing(folder, sent):
+    """Return what the recording of all legs lacks: first, last and number of them by topic."""
+    found = numbers(folder)
+    lacking = {topic: sorted({*range(1, sent + 1)} - {*found.get(topic, ())}) for topic in LEGS}
+    return {topic: (each[0], each[-1], len(each)) for topic, each in lacking.items() if each}

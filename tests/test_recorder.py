@@ -1,0 +1,305 @@
+"""Recordings of live topics: complete, standard, safe from kills and full disks."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections import namedtuple
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from leg_msgs.msg import EffortLimits, LegStates
+from leg_msgs_py import durable_bag
+from leg_msgs_py.bags import Bag
+from leg_msgs_py.client import LegClient
+from leg_msgs_py.definitions import UnknownTypeError, message_class, message_definition
+from leg_msgs_py.durable_bag import DurableBag, RecordingError
+from leg_msgs_py.record import main
+from leg_msgs_py.recorder import matching_qos, recorded_qos
+from nodes_support import wait_for
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.serialization import deserialize_message, serialize_message
+from recorder_support import LEGS, RecordProcess, missing, numbers, report_of, sender
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosReliability
+from ruamel.yaml import YAML
+from std_msgs.msg import String
+from stereo_msgs.msg import DisparityImage
+
+STATES = "leg_msgs/msg/LegStates"
+STRING = "std_msgs/msg/String"
+TEXT = serialize_message(String(data="x" * 1000))
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+# --------------------------------------------------------------------------- the file
+
+
+def test_a_recording_names_types_hashes_and_qos_as_rosbag2_does(tmp_path):
+    qos = [recorded_qos(qos_profile_sensor_data), recorded_qos(LATCHED)]
+    with DurableBag(tmp_path / "walk") as bag:
+        bag.put(bag.add_topic("/states", STATES, qos), 5, serialize_message(LegStates()))
+    with AnyReader([tmp_path / "walk"]) as reader:
+        (connection,) = reader.connections
+        assert connection.digest == message_definition(STATES).hash
+        assert connection.digest == reader.typestore.hash_rihs01(STATES)
+        assert connection.ext.offered_qos_profiles == qos
+        (message,) = reader.messages()
+        assert reader.deserialize(message[2], STATES).legs == []
+    information = YAML(typ="safe").load(tmp_path / "walk" / "metadata.yaml")
+    information = information["rosbag2_bagfile_information"]
+    assert (information["version"], information["storage_identifier"]) == (9, "mcap")
+    assert information["relative_file_paths"] == ["walk.mcap"]
+    (topic,) = information["topics_with_message_count"]
+    assert topic["topic_metadata"]["type_description_hash"] == connection.digest
+    assert topic["topic_metadata"]["offered_qos_profiles"][0]["reliability"] == "best_effort"
+    content = (tmp_path / "walk" / "walk.mcap").read_bytes()
+    assert b"topic_type_hash" in content  # of the channel, for readers without metadata.yaml
+
+
+def test_a_definition_has_the_comments_and_all_types_it_needs():
+    text, digest = message_definition(STATES)
+    first, *others = text.split("=" * 80)
+    assert "# one per leg, in the order of the robot description" in first
+    assert [part.split("\n")[1] for part in others] == [
+        *("MSG: builtin_interfaces/Time", "MSG: leg_msgs/LegState", "MSG: std_msgs/Header")
+    ]
+    assert digest.startswith("RIHS01_")
+
+
+@pytest.mark.parametrize("name", ["leg_msgs/msg/Wing", "no_such_msgs/msg/Leg", "Leg", ""])
+def test_an_unknown_type_is_told(name):
+    for ask in (message_class, message_definition):
+        with pytest.raises(UnknownTypeError, match=f"message type {name} is not installed"):
+            ask(name)
+
+
+def test_a_recording_without_messages_is_whole(tmp_path):
+    with DurableBag(tmp_path / "nothing"):
+        pass
+    with AnyReader([tmp_path / "nothing"]) as reader:
+        assert list(reader.messages()) == []
+
+
+def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path):
+    with DurableBag(tmp_path / "fast", queue_size=100_000) as bag:
+        topic = bag.add_topic("/text", STRING, [])
+        for k in range(500):  # within one period of the writer: it takes 1150 bytes for each
+            bag.put(topic, k, TEXT)
+            assert bag.waiting <= 100_000
+    assert topic.dropped > 0
+    assert topic.written + topic.dropped == 500
+    assert Bag(tmp_path / "fast").counts["/text"] == topic.written
+
+
+def test_a_folder_that_exists_or_cannot_be_made_is_told(tmp_path):
+    with pytest.raises(RecordingError, match=f"{tmp_path} exists; a recording needs a new folder"):
+        DurableBag(tmp_path).__enter__()
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match=r"cannot make .*/file/walk: Not a directory"):
+        DurableBag(tmp_path / "file" / "walk").__enter__()
+
+
+def test_a_disk_that_gets_full_ends_the_recording_which_is_whole(tmp_path, monkeypatch):
+    usage = namedtuple("usage", "free")
+    monkeypatch.setattr(durable_bag.shutil, "disk_usage", lambda path: usage(2**20))
+    bag = DurableBag(tmp_path / "walk").__enter__()
+    topic = bag.add_topic("/text", STRING, [])
+    bag.put(topic, 1, TEXT)
+    wait_for(lambda: bag.failure)
+    bag.put(topic, 2, TEXT)
+    with pytest.raises(RecordingError, match=r"is full: 1 MiB left; what was recorded is whole"):
+        bag.__exit__(None, None, None)
+    assert (topic.written, topic.dropped) == (1, 1)
+    with AnyReader([tmp_path / "walk"]) as reader:
+        assert reader.message_count == 1
+
+
+WRITE_TOO_MUCH = """
+import resource, sys, time
+from leg_msgs_py.durable_bag import DurableBag, RecordingError
+resource.setrlimit(resource.RLIMIT_FSIZE, (3_000_000, 3_000_000))
+try:
+    with DurableBag(sys.argv[1]) as bag:
+        topic = bag.add_topic("/text", "std_msgs/msg/String", [])
+        for k in range(1, 100_000):
+            bag.put(topic, k, bytes(1000))
+            if bag.failure:
+                break
+            time.sleep(1e-4)
+except RecordingError as error:
+    print(topic.written + topic.dropped == k, error)
+"""
+
+
+def test_what_was_written_before_the_disk_failed_is_kept(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", WRITE_TOO_MUCH, tmp_path / "walk"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stderr == ""
+    assert done.stdout.startswith(f"True cannot write {tmp_path / 'walk'}: File too large; all but")
+    times = [message.time for message in Bag(tmp_path / "walk").messages()]
+    assert len(times) > 2000
+    assert times == [*range(1, len(times) + 1)]
+
+
+# --------------------------------------------------------------------------- the command
+
+
+def recording_legs(folder):
+    return RecordProcess(folder / "walk", "--topics", "/leg_*", "/diagnostics")
+
+
+def test_nothing_is_lost_at_1_khz_for_six_legs(tmp_path):
+    with recording_legs(tmp_path) as record, sender(1000.0, 2.0, LEGS) as sending:
+        sent = report_of(sending)["sent"]
+        output = record.stop()
+        assert record.process.returncode == 0
+    assert missing(tmp_path / "walk", sent) == {}, output
+    assert "dropped:" not in output
+    assert "lost by" not in output
+    bag = Bag(tmp_path / "walk")
+    assert (bag.damages, bag.expected) == ({}, bag.counts.total())
+    assert bag.topics[LEGS[0]].qos[0].reliability == QosReliability.BEST_EFFORT
+    assert bag.topics[LEGS[1]].qos[0].reliability == QosReliability.RELIABLE
+    # the recorder's own diagnostics are in the recording, too
+    *_, status = (
+        status
+        for message in bag.messages(["/diagnostics"])
+        for status in deserialize_message(message.data, DiagnosticArray).status
+        if status.name == "/leg_recorder: recording"
+    )
+    assert status.level == DiagnosticStatus.OK
+    values = {value.key: value.value for value in status.values}
+    assert values["dropped messages"] == values["messages lost by the middleware"] == "0"
+
+
+def test_a_kill_loses_less_than_a_second(tmp_path):
+    with recording_legs(tmp_path) as record, sender(500.0, 2.0, LEGS[:1]) as sending:
+        wait_for(lambda: record.size() > 100_000)
+        record.stop(signal.SIGKILL)
+        killed = time.time_ns()
+        report_of(sending)
+    bag = Bag(tmp_path / "walk")
+    assert bag.damages.keys() == {"walk.mcap"}
+    (found,) = numbers(tmp_path / "walk").values()
+    assert found == [*range(1, len(found) + 1)]
+    assert killed - 10**9 < bag.end < killed
+
+
+def test_what_the_middleware_loses_is_counted(tmp_path):
+    with recording_legs(tmp_path) as record, sender(1000.0, 2.0, LEGS[:1]) as sending:
+        wait_for(lambda: record.size() > 50_000)
+        record.process.send_signal(signal.SIGSTOP)
+        time.sleep(1.0)  # what overflows meanwhile is lost
+        record.process.send_signal(signal.SIGCONT)
+        sent = report_of(sending)["sent"]
+        output = record.stop()
+    (found,) = numbers(tmp_path / "walk").values()
+    assert len(found) < sent
+    assert f"{sent - len(found)} lost by the middleware" in output
+
+
+@pytest.fixture(scope="module")
+def node():
+    with LegClient() as client:
+        yield client.node
+
+
+def test_topics_are_recorded_whenever_and_however_they_appear(tmp_path, node):
+    latched = node.create_publisher(EffortLimits, "/early/effort_limits", LATCHED)
+    latched.publish(EffortLimits(joint_names=["knee"]))
+    with RecordProcess(tmp_path / "walk", "--topics", "/early/*", "/late") as record:
+        wait_for(latched.get_subscription_count)
+        late = node.create_publisher(String, "/late", qos_profile_sensor_data)
+        other = node.create_publisher(String, "/later", 10)
+        wait_for(late.get_subscription_count)
+        while record.size() < 50_000:  # what is sent before both sides are connected is lost
+            late.publish(String(data="x" * 10_000))
+            time.sleep(0.01)
+        assert other.get_subscription_count() == 0
+        output = record.stop(signal.SIGTERM)
+        assert record.process.returncode == 0
+    for publisher in (latched, late, other):
+        node.destroy_publisher(publisher)
+    bag = Bag(tmp_path / "walk")
+    assert bag.topics.keys() == {"/early/effort_limits", "/late"}
+    assert bag.topics["/early/effort_limits"].qos[0].durability == QosDurability.TRANSIENT_LOCAL
+    (message,) = bag.messages(["/early/effort_limits"])
+    assert bag.decode(message).joint_names == ["knee"]
+    assert f"1 of {bag.topics['/early/effort_limits'].type}" in output
+
+
+def test_what_cannot_be_recorded_is_told(tmp_path, node):
+    (tmp_path / "stereo_msgs").mkdir()
+    (tmp_path / "stereo_msgs" / "__init__.py").touch()  # hides the package from the recorder
+    publisher = node.create_publisher(String, "/name", 10)
+    strange = node.create_publisher(DisparityImage, "/strange", 10)
+    names = ("--topics", "/name", "/strange")
+    with (
+        RecordProcess(tmp_path / "walk", *names, PYTHONPATH=str(tmp_path)) as record,
+        LegClient() as late,
+    ):
+        wait_for(publisher.get_subscription_count)
+        late.node.create_publisher(EffortLimits, "/name", 10)
+        unreliable = node.create_publisher(String, "/name", qos_profile_sensor_data)
+        shown = "".join(record.process.stderr.readline() for _ in range(4))
+        output = record.stop()
+        assert record.process.returncode == 0
+    for each in (publisher, strange, unreliable):
+        node.destroy_publisher(each)
+    for remark in (
+        "/name: a publisher that came later offers less than the first ones",
+        "/name: only its messages of std_msgs/msg/String are recorded, not of leg_msgs/msg/Effort",
+        "/strange: message type stereo_msgs/msg/DisparityImage is not installed; not recorded",
+    ):
+        assert remark in shown
+        assert remark in output
+
+
+def test_a_recording_ends_after_its_duration(tmp_path):
+    arguments = ("--duration", "0.2", "--topics", "/of/nobody")
+    with RecordProcess(tmp_path / "walk", *arguments) as record:
+        assert record.wait().startswith(f"{tmp_path / 'walk'}: 0 messages in 0.")
+        assert record.process.returncode == 0
+    assert (tmp_path / "walk" / "metadata.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--topics", "joint_states"], "--topics: 'joint_states' must begin with / (or with *)"),
+        (["--duration", "0"], "--duration must be a number > 0, got 0"),
+        (["--queue", "nan"], "--queue must be a number > 0, got nan"),
+        (["--queue", "inf"], "--queue must be a number > 0, got inf"),
+    ],
+)
+def test_wrong_arguments_are_told(arguments, message, capsys):
+    assert main(arguments) == 1
+    assert capsys.readouterr().err == f"record: {message}\n"
+
+
+def test_a_recording_that_cannot_begin_is_told(tmp_path):
+    with RecordProcess(tmp_path) as record:
+        assert record.wait() == ""
+        assert record.errors == f"record: {tmp_path} exists; a recording needs a new folder\n"
+        assert record.process.returncode == 1
+
+
+# --------------------------------------------------------------------------- quality of service
+
+
+def test_the_recorder_asks_for_what_every_publisher_offers():
+    reliable, latched = QoSProfile(depth=10), LATCHED
+    for offered, reliability, durability in (
+        ([reliable], "RELIABLE", "VOLATILE"),
+        ([latched, latched], "RELIABLE", "TRANSIENT_LOCAL"),
+        ([reliable, latched], "RELIABLE", "VOLATILE"),
+        ([reliable, qos_profile_sensor_data], "BEST_EFFORT", "VOLATILE"),
+    ):
+        asked = matching_qos(offered)
+        assert asked.reliability == ReliabilityPolicy[reliability]
+        assert asked.durability == DurabilityPolicy[durability]
