@@ -144,9 +144,11 @@ def _common_batch(shapes: list[tuple[int, ...]]) -> tuple[int, ...]:
 def _folded(array: Any, leading: tuple[int, ...], batch: tuple[int, ...]) -> Any:
     """Return an array, broadcast to a batch, with one axis in place of the leading ones."""
     of_point = array.shape[len(leading) :]
+    count = math.prod(batch)
+    if not leading and count == 1:
+        return array[None]
     if not leading and array.flags.c_contiguous:  # what `np.broadcast_to` does, in a tenth the time
-        strides = (0, *array.strides)
-        return np.ndarray((math.prod(batch), *of_point), array.dtype, array, strides=strides)
+        return np.ndarray((count, *of_point), array.dtype, array, strides=(0, *array.strides))
     if leading != batch:
         array = np.broadcast_to(array, batch + of_point)
     return array if len(batch) == 1 else array.reshape(-1, *of_point)

@@ -235,18 +235,8 @@ VALID, HOLDS, CERTAIN, ROUGH = 10, 11, 12, 13
 VERDICT, CAPACITY, MU_E, MU_FULL, FORCE, SHARE, JOINT, OF_POINT = 14, 15, 16, 17, 18, 21, 22, 23
 # then what n joints have, each row n times: columns of both Jacobians (3 n), limits, bias; the
 # reserve, what it leaves of the limits, and the efforts.
-J, OMEGA, LOWER, UPPER, BIAS, RESERVE, LEAST, MOST, TAU, OF_JOINTS = (
-    0,
-    3,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-    13,
-)
+J, OMEGA = 0, 3
+LOWER, UPPER, BIAS, RESERVE, LEAST, MOST, TAU, OF_JOINTS = range(6, 14)
 
 
 @inlined

@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import NoReturn, Protocol
+from typing import Protocol
 
 from leg_msgs_py.bags import SUFFIXES, Bag, BagError, BagMessage
 from leg_msgs_py.definitions import UnknownTypeError
@@ -27,6 +27,7 @@ from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError, ValueRangeError
 from leg_statics import judge_report, judge_table
 from leg_statics.bag_judge import BagJudge, Judgement, Topics
+from leg_statics.command_line import ArgumentParser
 from leg_statics.diagnostic_log import DIAGNOSTICS, DiagnosticLog
 from leg_statics.grounds import load_grounds
 from leg_statics.judge_findings import Findings
@@ -57,16 +58,9 @@ class Sink(Protocol):
         """Take up judgements."""
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: error: {message}\n")
-
-
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = _Parser(
+    parser = ArgumentParser(
         prog="judge_bag",
         description=__doc__,
         epilog=EXAMPLES,

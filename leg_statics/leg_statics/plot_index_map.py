@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -19,6 +19,7 @@ from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError,
 from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
 from leg_kinematics.robot import Leg
 from leg_statics import plots
+from leg_statics.command_line import ArgumentParser
 from leg_statics.global_means import means_on_grid
 from leg_statics.grounds import Ground, load_grounds
 from leg_statics.indices import find_index, supported_indices
@@ -259,16 +260,9 @@ def load_legs(
 # --------------------------------------------------------------------------- command
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: error: {message}\n")
-
-
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = _Parser(
+    parser = ArgumentParser(
         prog="plot_index_map",
         description=__doc__,
         epilog=EXAMPLES,
