@@ -78,7 +78,9 @@ class Document:
             mark = error.problem_mark
             where = f"{path}:{mark.line + 1}" if mark else str(path)
             raise DescriptionError(f"{where}: {error.problem or error.context}") from None
-        except (YAMLError, UnicodeDecodeError, OSError, RecursionError) as error:
+        except OSError as error:
+            raise DescriptionError(f"{path}: {error.strerror}") from None
+        except (YAMLError, UnicodeDecodeError, RecursionError) as error:
             raise DescriptionError(f"{path}: {error}") from None
 
     def node(self, *where: Any) -> Any:
