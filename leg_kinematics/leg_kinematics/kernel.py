@@ -55,7 +55,7 @@ POINTS = "points"  # axis of the points in a layout
 # C's feclearexcept: a kernel that runs over points ends with it, because NaN marks points without
 # an answer; numpy would warn of each.
 _clear_float_flags = types.ExternalFunction("feclearexcept", types.int32(types.int32))
-_ALL_FLAGS = 0x3F
+_ALL_FLAGS = 0x3F  # C ignores the bits that a processor does not have
 
 
 @inlined
@@ -155,7 +155,7 @@ def _folded(array: Any, leading: tuple[int, ...], batch: tuple[int, ...]) -> Any
 
 
 def kernel(layout: str, types: str) -> Callable[[Callable[..., None]], Kernel]:
-    """Make a function of one point a generalized ufunc.
+    """Make a function of one point, or one that runs over points, a generalized ufunc.
 
     Args:
         layout: Layout of inputs and outputs, e.g. "(n),()->(n)".

@@ -16,6 +16,7 @@ import re
 import shutil
 import sqlite3
 import tempfile
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -486,7 +487,7 @@ class _Sound(_File):
         self._reader.close()
 
 
-class _Torn(_File):
+class _Torn(_File, ABC):
     """A file that is read from the front: only reading it shows what is in it.
 
     Args:
@@ -508,9 +509,9 @@ class _Torn(_File):
     def messages(self, topics: Collection[str]) -> Iterator[tuple[Topic, int, bytes]]:
         return (found for found in self._read() if found[0].name in topics)
 
+    @abstractmethod
     def _read(self) -> Iterator[tuple[Topic, int, bytes]]:
         """Yield all messages before the damage, and note topics and damage."""
-        raise NotImplementedError
 
 
 class _TornMcap(_Torn):

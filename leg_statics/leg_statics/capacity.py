@@ -96,10 +96,8 @@ def load_capacity(
     if matrix.ndim < 2 or matrix.shape[-2] != 3 or matrix.shape[-1] < 1:
         raise ShapeError(f"jacobian must have shape (..., 3, n) with n >= 1, got {matrix.shape}")
     n = matrix.shape[-1]
-    lower, upper = (
-        as_array("effort_lower", effort_lower, n),
-        as_array("effort_upper", effort_upper, n),
-    )
+    lower = as_array("effort_lower", effort_lower, n)
+    upper = as_array("effort_upper", effort_upper, n)
     mu, direction = as_array("friction", friction), as_array("normal", normal, 3)
     idle = as_vectors("bias", bias, n)
     try:

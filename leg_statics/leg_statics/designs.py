@@ -13,13 +13,15 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from leg_kinematics.arrays import FloatArray, as_array, as_non_negative
+from leg_kinematics.arrays import as_array, as_non_negative
 from leg_kinematics.errors import GeometryError, UnknownNameError, ValueRangeError
-from leg_kinematics.mechanism import Mechanism, Posture, geometry_parameters
+from leg_kinematics.mechanism import Mechanism, geometry_parameters
 from leg_kinematics.mirrored import Mirrored
 from leg_statics.capacity import check_effort_limits
-from leg_statics.footholds import Contact, evaluate_postures
-from leg_statics.indices import INDICES, Index, evaluate_indices, supported_indices
+from leg_statics.footholds import Contact
+from leg_statics.indices import INDICES, Index, supported_indices
+from leg_statics.kinematics import Kinematics
+from leg_statics.maps import CAPACITY_LAYER, layer_values
 from leg_statics.step_length import Criterion, longest_step
 from leg_statics.workspace_averages import (
     FEWEST_POINTS,
@@ -34,7 +36,7 @@ STEP_HEIGHTS = 6  # heights that are tried for the longest step
 WORKSPACE_VOLUME = "workspace_volume"
 USABLE_SHARE = "usable_share"
 STEP_LENGTH = "step_length"
-LOAD_CAPACITY = "load_capacity"
+LOAD_CAPACITY = CAPACITY_LAYER
 
 
 @dataclass(frozen=True)
@@ -261,9 +263,12 @@ def evaluate_design(
     if not averaged:
         return Evaluation(values, 0.0, "; ".join(problems))
     means = [name for name in averaged if name not in (WORKSPACE_VOLUME, USABLE_SHARE)]
+    contact = _contact(asked) if LOAD_CAPACITY in means else None
     found = average(
         mechanism,
-        lambda posture: _values(mechanism, posture, means, asked),
+        lambda posture: layer_values(
+            Kinematics(mechanism, posture), means, asked.effort_limits, contact
+        ),
         asked.tolerance,
         asked.most_points,
     )
@@ -279,23 +284,6 @@ def _is_defined(mechanism: Mechanism, name: str, conditions: Conditions) -> bool
     by_rated_friction = name == STEP_LENGTH and conditions.criterion == Criterion.RATED_FRICTION
     needed = (name, "rated_friction") if by_rated_friction else (name,)
     return all(METRICS[n].supports(mechanism) for n in needed)
-
-
-def _values(
-    mechanism: Mechanism, posture: Posture, names: Sequence[str], conditions: Conditions
-) -> FloatArray:
-    """Return the values whose means are metrics (..., K)."""
-    result = np.empty((*np.shape(posture.status), len(names)))
-    indices = [name for name in names if name != LOAD_CAPACITY]
-    if indices:
-        columns = [name != LOAD_CAPACITY for name in names]
-        result[..., columns] = evaluate_indices(mechanism, posture, indices)[1]
-    if LOAD_CAPACITY in names:
-        footholds = evaluate_postures(
-            mechanism, conditions.effort_limits, posture, _contact(conditions)
-        )
-        result[..., names.index(LOAD_CAPACITY)] = footholds.load_capacity
-    return result
 
 
 def _longest_step(mechanism: Mechanism, conditions: Conditions) -> float:

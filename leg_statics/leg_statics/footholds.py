@@ -162,17 +162,10 @@ def evaluate_footholds(
     return judge_footholds(Kinematics.of_feet(mechanism, foot), effort_limits, contact)
 
 
-def evaluate_postures(
-    mechanism: Mechanism, effort_limits: ArrayLike, posture: Posture, contact: Contact
-) -> Footholds:
-    """Evaluate solved postures as footholds; see `evaluate_footholds`."""
-    return judge_footholds(Kinematics(mechanism, posture), effort_limits, contact)
-
-
 def judge_footholds(
     kinematics: Kinematics, effort_limits: ArrayLike, contact: Contact
 ) -> Footholds:
-    """Evaluate solved postures whose Jacobians may be known; see `evaluate_footholds`."""
+    """Evaluate solved postures as footholds; see `evaluate_footholds`."""
     mechanism, posture = kinematics.mechanism, kinematics.posture
     if len(mechanism.task_coordinates) != 3:
         raise NotSupportedError(

@@ -259,12 +259,30 @@ def _slice(
     values = np.full((*x_grid.shape, len(names)), np.nan)
     inside = posture.status == Status.OK  # most of a box about the workspace is outside of it
     kinematics = Kinematics(mechanism, Posture(*(field[inside] for field in posture)))
-    columns = np.empty((np.count_nonzero(inside), len(names)))
+    values[inside] = layer_values(kinematics, names, effort_limits, contact)
+    return values, posture.status
+
+
+def layer_values(
+    kinematics: Kinematics,
+    names: Sequence[str],
+    effort_limits: ArrayLike | None = None,
+    contact: Contact | None = None,
+) -> FloatArray:
+    """Return the values of layers (..., K); NaN where a posture's status is not OK.
+
+    Args:
+        kinematics: Solved postures (...).
+        names: Names of K layers.
+        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
+        contact: Ground for the layer "load_capacity".
+    """
+    values = np.empty((*np.shape(kinematics.posture.status), len(names)))
     indices = [name for name in names if name != CAPACITY_LAYER]
     if indices:
-        columns[:, [names.index(name) for name in indices]] = indices_of(kinematics, indices)[1]
+        columns = [name != CAPACITY_LAYER for name in names]
+        values[..., columns] = indices_of(kinematics, indices)[1]
     if CAPACITY_LAYER in names and effort_limits is not None and contact is not None:
         footholds = judge_footholds(kinematics, effort_limits, contact)
-        columns[:, names.index(CAPACITY_LAYER)] = footholds.load_capacity
-    values[inside] = columns
-    return values, posture.status
+        values[..., names.index(CAPACITY_LAYER)] = footholds.load_capacity
+    return values

@@ -20,9 +20,10 @@ from leg_statics.designs import (
     missing_condition,
     supported_metrics,
 )
-from leg_statics.footholds import Contact, evaluate_postures
+from leg_statics.footholds import Contact, judge_footholds
 from leg_statics.global_means import means_on_grid, sample_workspace
 from leg_statics.indices import INDICES, supported_indices
+from leg_statics.kinematics import Kinematics
 from leg_statics.step_length import Criterion, longest_step
 
 LEG = ParallelDrive()
@@ -84,7 +85,7 @@ def test_load_capacity_is_the_mean_of_the_capacity_of_all_poses():
     found = evaluate_design(LEG, CHANGES, ["load_capacity"], GROUND)
     leg = replace(LEG, **CHANGES)
     sample = sample_workspace(leg, 33)
-    capacity = evaluate_postures(leg, LIMITS, sample.posture, Contact(0.4)).load_capacity
+    capacity = judge_footholds(Kinematics(leg, sample.posture), LIMITS, Contact(0.4)).load_capacity
     mean = np.average(capacity, weights=sample.volume)
     assert found.values["load_capacity"] == pytest.approx(mean, rel=GROUND.tolerance)
 
