@@ -10,6 +10,7 @@ from types import SimpleNamespace
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
 
 HERE = Path(__file__).resolve().parent
+os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(HERE / "fastdds_log.xml")
 sys.path[:0] = [str(HERE), str(HERE.parent / "tools")]
 
 import pytest  # noqa: E402

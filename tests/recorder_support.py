@@ -14,6 +14,7 @@ from node_processes import find_executable
 
 SENDER = Path(__file__).with_name("numbered_sender.py")
 LEGS = tuple(f"/leg_{k}/joint_states" for k in range(6))
+BEST_EFFORT, RELIABLE = LEGS[::2], LEGS[1::2]  # what the sender makes of them
 STOP_TIMEOUT = 30.0  # [s]
 
 
