@@ -9,7 +9,9 @@ rigid triangle carries a further point of a bar. `M` turns a vector by +90°:
     triangle  = p + along (q - p) + across M (q - p)        with constant coefficients
 
 This is the form of equations (2)-(4) of paper 003; `along` and `across` are its q1 ... q6.
-Everything is a function of one point for use inside kernels. A dyad that does not close gives NaN.
+Everything is a function of one point for use inside kernels, without branches, so that a kernel
+assembles several linkages with one instruction; taken in where it is used, so that a kernel that
+wants positions only computes no velocities and accelerations. A dyad that does not close gives NaN.
 """
 
 from __future__ import annotations
@@ -17,13 +19,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
-
-from leg_kinematics.kernel import scalar
-
-# The function that strings a whole linkage together is inlined where it is used, so that a kernel
-# that wants positions only does not compute velocities and accelerations.
-linkage = numba.njit(error_model="numpy", forceinline=True)
+from leg_kinematics.kernel import inlined
 
 # A dyad stretched or folded to within rounding is closed; its joint is then on the line p-q.
 CLOSED = 1e-13
@@ -40,13 +36,13 @@ class Point(NamedTuple):
     ay: float
 
 
-@scalar
+@inlined
 def fixed(x: float, y: float) -> Point:
     """Return a point of the frame."""
     return Point(x, y, 0.0, 0.0, 0.0, 0.0)
 
 
-@scalar
+@inlined
 def crank_pin(
     center: Point, length: float, angle: float, rate: float, acceleration: float
 ) -> Point:
@@ -62,7 +58,7 @@ def crank_pin(
     )
 
 
-@scalar
+@inlined
 def dyad_coefficients(
     p: Point, q: Point, first: float, second: float, side: float
 ) -> tuple[float, float]:
@@ -80,12 +76,11 @@ def dyad_coefficients(
     reach = first * first * inverse
     along = 0.5 * (1.0 + reach - second * second * inverse)
     square = reach - along * along
-    if -CLOSED * (1.0 + reach) < square < 0.0:
-        square = 0.0
-    return along, side * math.sqrt(square)
+    closed = (-CLOSED * (1.0 + reach) < square) & (square < 0.0)
+    return along, side * math.sqrt(0.0 if closed else square)
 
 
-@scalar
+@inlined
 def dyad(p: Point, q: Point, along: float, across: float) -> Point:
     """Return the joint of two bars of constant lengths, given its coefficients.
 
@@ -107,14 +102,14 @@ def dyad(p: Point, q: Point, along: float, across: float) -> Point:
     return Point(x, y, vx, vy, ax, ay)
 
 
-@scalar
+@inlined
 def transmission(p: Point, q: Point, across: float, first: float, second: float) -> float:
     """Return |sin| of the angle between the two bars of a dyad: 0 at its dead point."""
     squared = (q.x - p.x) ** 2 + (q.y - p.y) ** 2
     return abs(across) * squared / (first * second)
 
 
-@scalar
+@inlined
 def triangle_coefficients(
     base: float, first: float, second: float, side: float
 ) -> tuple[float, float]:
@@ -131,7 +126,7 @@ def triangle_coefficients(
     return along, side * math.sqrt(max(0.0, reach - along * along))
 
 
-@scalar
+@inlined
 def rigid_point(p: Point, q: Point, along: float, across: float) -> Point:
     """Return the point of the body through p and q that has constant coefficients."""
     return Point(
@@ -144,7 +139,7 @@ def rigid_point(p: Point, q: Point, along: float, across: float) -> Point:
     )
 
 
-@scalar
+@inlined
 def turning_rate(p: Point, q: Point) -> float:
     """Return the angular velocity of the body through p and q, counter-clockwise."""
     dx, dy = q.x - p.x, q.y - p.y

@@ -95,6 +95,21 @@ def test_the_crank_turns_all_the_way_round_and_the_foot_is_g(leg):
 
 
 @legs
+def test_a_batch_is_its_crank_angles_one_by_one(leg):
+    odd = [math.nan, math.inf, -math.inf, 1e300]
+    q = np.append(np.linspace(-4.0, 4.0, 131), odd)[:, None]  # more than two blocks
+    q = np.random.default_rng(5).permutation(q)
+    for mode in leg.assembly_modes[:2]:
+        posture = leg.forward(q, mode)
+        points = leg.linkage(posture).points
+        for i in range(len(q)):
+            alone = leg.forward(q[i], mode)
+            for field, one in zip(posture, alone, strict=True):
+                np.testing.assert_array_equal(field[i], one)
+            np.testing.assert_array_equal(points[i], leg.linkage(alone).points)
+
+
+@legs
 def test_jacobian_and_acceleration_are_derivatives(leg):
     step = 1e-6
     for mode in (leg.assembly_modes[0], leg.assembly_modes[1]):

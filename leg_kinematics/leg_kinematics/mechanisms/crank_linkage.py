@@ -7,7 +7,7 @@ the crank turns forwards: the leg walks along +y. The crank's axis is -x of the 
 
 A mechanism adds its geometry and a handful of kernels, which all get its geometry and its `sides`:
 numbers whose signs tell the assembly (see `dyads`). A posture's closure is such numbers, the
-`across` coefficient of each dyad.
+`across` coefficient of each dyad. The kernels that give positions run over blocks of crank angles.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
-from leg_kinematics.dyads import Point
+from leg_kinematics.blocks import load, put, store
+from leg_kinematics.dyads import Point, crank_pin, fixed
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import Kernel, kernel, scalar
+from leg_kinematics.kernel import Kernel, inlined, kernel, scalar
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -97,23 +98,112 @@ class Passes(NamedTuple):
 # --------------------------------------------------------------------------- scalar mathematics
 
 
-@scalar
+@inlined
 def side(number: float) -> float:
     """Return the sign of a number as +1 or -1; NaN for NaN."""
     return math.nan if math.isnan(number) else math.copysign(1.0, number)
 
 
-@scalar
-def status_of_crank(q: float, limits: FloatArray, foot: Point, transmission: float) -> int:
+@inlined
+def in_leg_frame(crank: float, x: float, y: float) -> tuple[float, float, float]:
+    """Return a vector of the linkage's plane, in crank lengths, in the leg frame."""
+    return 0.0, -crank * x, crank * y
+
+
+@inlined
+def turning_pin(angle: float) -> Point:
+    """Return the crank's pin B and its derivatives by the crank angle."""
+    return crank_pin(fixed(0.0, 0.0), 1.0, angle, 1.0, 0.0)
+
+
+@inlined
+def status_of_crank(q: float, limits: tuple[float, float], foot: Point, transmission: float) -> int:
     """Return the status of one crank angle, given the worst transmission of its dyads."""
-    if not math.isfinite(q):
-        return INVALID_INPUT
-    if not math.isfinite(foot.x + foot.y + transmission):
-        return UNREACHABLE
-    if transmission < DEAD_POINT:
-        return SINGULAR
     unlimited = limits[1] - limits[0] >= TURN - LIMIT_TOLERANCE
-    return OK if unlimited or within(q, limits) else JOINT_LIMIT
+    status = OK if unlimited | within(q, limits) else JOINT_LIMIT
+    status = SINGULAR if transmission < DEAD_POINT else status
+    status = status if math.isfinite(foot.x + foot.y + transmission) else UNREACHABLE
+    return status if math.isfinite(q) else INVALID_INPUT
+
+
+# Kernels that give positions run over blocks of crank angles with these rows; more may follow.
+Q, PIN, STATUS, FOOT, CLOSURE = 0, 1, 3, 4, 7
+
+
+@inlined
+def load_cranks(block: FloatArray, q: FloatArray, zero: float, start: int, end: int) -> None:
+    """Fill the rows of crank angles and pins of a block.
+
+    The loop that assembles the linkages takes the pins from there, because the library's cosine
+    and sine compute one angle at a time.
+    """
+    load(block, Q, q, start, end, 1)
+    for i in range(end - start):
+        pin = turning_pin(zero + block[Q, i])
+        block[PIN, i], block[PIN + 1, i] = pin.x, pin.y
+
+
+@inlined
+def resting_pin(block: FloatArray, i: int) -> Point:
+    """Return the crank's pin B where only positions are asked for."""
+    return fixed(block[PIN, i], block[PIN + 1, i])
+
+
+@inlined
+def put_forward(
+    block: FloatArray,
+    i: int,
+    crank: float,
+    limits: tuple[float, float],
+    foot: Point,
+    closure: tuple[float, ...],
+    transmission: float,
+) -> None:
+    """Write status, foot in the leg frame and closure; NaN where there is no answer."""
+    status = status_of_crank(block[Q, i], limits, foot, transmission)
+    known = math.nan if (status == UNREACHABLE) | (status == INVALID_INPUT) else 1.0
+    block[STATUS, i] = status
+    x, y, z = in_leg_frame(crank, foot.x, foot.y)
+    put(block, FOOT, i, (x * known, y * known, z * known))
+    for k in range(len(closure)):
+        block[CLOSURE + k, i] = closure[k] * known
+
+
+@inlined
+def store_forward(
+    block: FloatArray,
+    foot: FloatArray,
+    closure: FloatArray,
+    status: FloatArray,
+    start: int,
+    end: int,
+    closures: int,
+) -> None:
+    """Copy what `put_forward` wrote to points start to end of arrays."""
+    store(block, FOOT, foot, start, end, 3)
+    store(block, CLOSURE, closure, start, end, closures)
+    for i in range(end - start):
+        status[start + i] = int(block[STATUS, i])
+
+
+@inlined
+def put_points(
+    block: FloatArray, row: int, i: int, crank: float, points: tuple[Point, ...]
+) -> None:
+    """Write points in the leg frame below each other, from `row` on."""
+    for k in range(len(points)):
+        put(block, row + 3 * k, i, in_leg_frame(crank, points[k].x, points[k].y))
+
+
+@inlined
+def store_points(
+    block: FloatArray, row: int, points: FloatArray, start: int, end: int, count: int
+) -> None:
+    """Copy what `put_points` wrote to an array (m, count, 3)."""
+    for i in range(end - start):
+        for k in range(count):
+            for axis in range(3):
+                points[start + i, k, axis] = block[row + 3 * k + axis, i]
 
 
 class Bracket(NamedTuple):

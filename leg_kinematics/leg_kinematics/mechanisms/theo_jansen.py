@@ -15,27 +15,26 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
+import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.blocks import BLOCK, get3, load
 from leg_kinematics.dyads import (
     Point,
-    crank_pin,
     dyad,
     dyad_coefficients,
     fixed,
-    linkage,
     rigid_point,
     transmission,
     triangle_coefficients,
     turning_rate,
 )
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
 from leg_kinematics.mechanism import Joint, flipped_modes, parameter
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
-    INVALID_INPUT,
-    UNREACHABLE,
+    CLOSURE,
     CrankLinkage,
     Dyad,
     Kernels,
@@ -43,10 +42,17 @@ from leg_kinematics.mechanisms.crank_linkage import (
     Triangle,
     approach,
     bracket_between,
+    in_leg_frame,
+    load_cranks,
     mode_sides,
     narrowed,
+    put_forward,
+    put_points,
+    resting_pin,
     side,
-    status_of_crank,
+    store_forward,
+    store_points,
+    turning_pin,
 )
 
 
@@ -89,9 +95,6 @@ class Constants(NamedTuple):
     across_g: float
 
 
-GEOMETRY_SIZE, CONSTANTS_SIZE = len(Geometry._fields), len(Constants._fields)
-
-
 class Points(NamedTuple):
     """The joints and the foot."""
 
@@ -105,6 +108,9 @@ class Points(NamedTuple):
     g: Point
 
 
+GEOMETRY_SIZE, CONSTANTS_SIZE = len(Geometry._fields), len(Constants._fields)
+POINTS_SIZE = len(Points._fields)
+
 # Which way round the dyads are assembled; the signs below are those of the walking leg.
 PARTS = ("lower_rocker", "upper_rocker", "foot")
 WALKING = (
@@ -112,6 +118,8 @@ WALKING = (
     1.0,  # U to the left of B to D
     1.0,  # F to the left of L to C
 )
+SIDES_SIZE = len(PARTS)
+Sides = tuple[float, float, float]
 
 
 @scalar
@@ -126,13 +134,10 @@ def constants_of(g: Geometry) -> Constants:
     )
 
 
-@linkage
-def linkage_points(
-    k: Constants, sides: FloatArray, angle: float
-) -> tuple[Points, float, float, float]:
-    """Return all points and the `across` coefficients of the dyads at C, U and F."""
+@inlined
+def linkage_points(k: Constants, sides: Sides, b: Point) -> tuple[Points, Sides]:
+    """Return all points, given the crank's pin, and the `across` coefficients of C, U and F."""
     a, d = fixed(0.0, 0.0), fixed(k.dx, k.dy)
-    b = crank_pin(a, 1.0, angle, 1.0, 0.0)
     along, across_c = dyad_coefficients(b, d, k.k, k.c, side(sides[0]))
     c = dyad(b, d, along, across_c)
     along, across_u = dyad_coefficients(b, d, k.j, k.b, side(sides[1]))
@@ -141,17 +146,30 @@ def linkage_points(
     along, across_f = dyad_coefficients(l, c, k.f, k.g, side(sides[2]))
     f = dyad(l, c, along, across_f)
     g = rigid_point(c, f, k.along_g, k.across_g)
-    return Points(a, b, c, d, u, l, f, g), across_c, across_u, across_f
+    return Points(a, b, c, d, u, l, f, g), (across_c, across_u, across_f)
 
 
-@linkage
-def foot_motion(k: Constants, sides: FloatArray, angle: float) -> Point:
+@inlined
+def worst_transmission(k: Constants, p: Points, across: Sides) -> float:
+    """Return the least transmission of the dyads."""
+    return min(
+        transmission(p.b, p.d, across[0], k.k, k.c),
+        transmission(p.b, p.d, across[1], k.j, k.b),
+        transmission(p.l, p.c, across[2], k.f, k.g),
+    )
+
+
+@inlined
+def foot_motion(k: Constants, sides: Sides, angle: float) -> Point:
     """Return the foot G and its derivatives by the crank angle."""
-    points, _, _, _ = linkage_points(k, sides, angle)
-    return points.g
+    return linkage_points(k, sides, turning_pin(angle))[0].g
 
 
 # --------------------------------------------------------------------------- kernels
+
+# Rows of a block that follow those of `crank_linkage`:
+POINTS = CLOSURE + SIDES_SIZE
+ROWS = POINTS + 3 * POINTS_SIZE
 
 
 @kernel("(g),(c)->(c)", "f8[:], f8[:], f8[:]")
@@ -162,40 +180,53 @@ def constants_of_geometry(geometry, shape, constants):  # type: ignore[no-untype
         constants[i] = k[i]
 
 
-@kernel("(c),(s),(l),(n),(d)->(d),(s),()", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]")
+@kernel(
+    "(c),(s),(l),(points,n),(d)->(points,d),(points,s),(points)",
+    "f8[:], f8[:], f8[:], f8[:,:], f8[:], f8[:,:], f8[:,:], u1[:]",
+)
 def _forward(constants, sides, limits, q, shape, foot, closure, status):  # type: ignore[no-untyped-def]
-    """Crank angle to foot in the leg frame, closure and status."""
+    """Crank angles to foot in the leg frame, closure and status; `shape` sets the foot's length."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    p, closure[0], closure[1], closure[2] = linkage_points(k, sides, k.zero + q[0])
-    worst = min(
-        transmission(p.b, p.d, closure[0], k.k, k.c),
-        transmission(p.b, p.d, closure[1], k.j, k.b),
-        transmission(p.l, p.c, closure[2], k.f, k.g),
-    )
-    status[0] = status_of_crank(q[0], limits, p.g, worst)
-    foot[0], foot[1], foot[2] = 0.0, -k.crank * p.g.x, k.crank * p.g.y
-    if status[0] == UNREACHABLE or status[0] == INVALID_INPUT:
-        foot[:] = math.nan
-        closure[:] = math.nan
+    mode, bounds = to_fixed_tuple(sides, SIDES_SIZE), to_fixed_tuple(limits, 2)
+    block = np.empty((ROWS, BLOCK))
+    for start in range(0, len(q), BLOCK):
+        end = min(start + BLOCK, len(q))
+        load_cranks(block, q, k.zero, start, end)
+        for i in range(end - start):
+            p, assembly = linkage_points(k, mode, resting_pin(block, i))
+            worst = worst_transmission(k, p, assembly)
+            put_forward(block, i, k.crank, bounds, p.g, assembly, worst)
+        store_forward(block, foot, closure, status, start, end, SIDES_SIZE)
+    ignore_float_errors()
 
 
 @kernel("(c),(s),(n),(d)->(d),(d),(d)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
 def _motion(constants, sides, q, shape, velocity, acceleration, turning):  # type: ignore[no-untyped-def]
     """First and second derivative of the foot and the foot link's turning by the crank angle."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    p = linkage_points(k, sides, k.zero + q[0])[0]
-    velocity[0], velocity[1], velocity[2] = 0.0, -k.crank * p.g.vx, k.crank * p.g.vy
-    acceleration[0], acceleration[1], acceleration[2] = 0.0, -k.crank * p.g.ax, k.crank * p.g.ay
+    p = linkage_points(k, sides, turning_pin(k.zero + q[0]))[0]
+    velocity[0], velocity[1], velocity[2] = in_leg_frame(k.crank, p.g.vx, p.g.vy)
+    acceleration[0], acceleration[1], acceleration[2] = in_leg_frame(k.crank, p.g.ax, p.g.ay)
     turning[0], turning[1], turning[2] = -turning_rate(p.c, p.f), 0.0, 0.0
 
 
-@kernel("(c),(s),(n),(p,d)->(p,d)", "f8[:], f8[:], f8[:], f8[:,:], f8[:,:]")
+@kernel(
+    "(c),(points,s),(points,n),(p,d)->(points,p,d)", "f8[:], f8[:,:], f8[:,:], f8[:,:], f8[:,:,:]"
+)
 def _points(constants, sides, q, shape, points):  # type: ignore[no-untyped-def]
     """All points in the leg frame."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    p = linkage_points(k, sides, k.zero + q[0])[0]
-    for i, point in enumerate((p.a, p.b, p.c, p.d, p.u, p.l, p.f, p.g)):
-        points[i, 0], points[i, 1], points[i, 2] = 0.0, -k.crank * point.x, k.crank * point.y
+    block = np.empty((ROWS, BLOCK))
+    for start in range(0, len(q), BLOCK):
+        end = min(start + BLOCK, len(q))
+        load_cranks(block, q, k.zero, start, end)
+        load(block, CLOSURE, sides, start, end, SIDES_SIZE)
+        for i in range(end - start):
+            mode = get3(block, CLOSURE, i)
+            p = linkage_points(k, mode, resting_pin(block, i))[0]
+            put_points(block, POINTS, i, k.crank, p)
+        store_points(block, POINTS, points, start, end, POINTS_SIZE)
+    ignore_float_errors()
 
 
 @kernel("(c),(s),(),(t)->(t)", "f8[:], f8[:], f8, f8[:], f8[:]")
