@@ -28,11 +28,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.service import Service
+from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from leg_kinematics.description import load_robot
-from leg_kinematics.errors import LegError
+from leg_kinematics.errors import LegError, ValueRangeError
 from leg_kinematics.health import Health
 from leg_kinematics.node_log import LibraryLog, NodeLog
 from leg_kinematics.requests import RequestError, error_code
@@ -42,6 +44,12 @@ from leg_kinematics.warm_up import warm_up_kinematics
 # The default depth of 10 loses requests when many clients ask at once.
 SERVICE_QOS = QoSProfile(depth=256)
 STREAM_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+# What the parameter `service_events` may be.
+SERVICE_EVENTS = {
+    "off": ServiceIntrospectionState.OFF,
+    "metadata": ServiceIntrospectionState.METADATA,
+    "contents": ServiceIntrospectionState.CONTENTS,
+}
 STOP_TIMEOUT = 5.0  # a callback may take this long to end when the node stops [s]
 
 
@@ -75,6 +83,14 @@ class RobotNode(Node):
         self.declare_number(
             "diagnostics_rate", 1.0, "Rate of /diagnostics [Hz].", (0.1, 100.0), read_only=True
         )
+        self.declare(
+            "service_events",
+            "off",
+            "What is published of every call on the topic _service_event below each service: "
+            f"{', '.join(SERVICE_EVENTS)} (requests and responses, for recordings).",
+        )
+        _check_service_events(self.value("service_events"))
+        self._served: list[Service] = []
         self.robot: Robot = load_robot(self.value("robot"))
         self.warm_up(self.robot)
         self._candidate = self.robot
@@ -120,23 +136,33 @@ class RobotNode(Node):
 
     def _check_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for parameter in parameters:
-            if parameter.name != "robot":
-                continue
             try:
-                candidate = load_robot(parameter.value)
-                self.warm_up(candidate)
-                self._candidate = candidate
+                if parameter.name == "robot":
+                    candidate = load_robot(parameter.value)
+                    self.warm_up(candidate)
+                    self._candidate = candidate
+                elif parameter.name == "service_events":
+                    _check_service_events(parameter.value)
             except Exception as error:
-                self.health.refuse("parameter robot", str(error))
-                self.get_logger().error(f"robot description refused: {error}")
+                self.health.refuse(f"parameter {parameter.name}", str(error))
+                self.get_logger().error(f"parameter {parameter.name} refused: {error}")
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply_parameters(self, parameters: Sequence[Parameter]) -> None:
-        if any(parameter.name == "robot" for parameter in parameters):
+        names = [parameter.name for parameter in parameters]
+        if "robot" in names:
             self.robot = self._candidate
             self.robot_changed()
             self.get_logger().info(f"robot {self.robot.name!r} loaded from {self.value('robot')}")
+        if "service_events" in names:
+            for service in self._served:
+                self._tell_events(service)
+
+    def _tell_events(self, service: Service) -> None:
+        """Publish as much of the calls of a service as the parameter `service_events` says."""
+        state = SERVICE_EVENTS[self.value("service_events")]
+        service.configure_introspection(self.get_clock(), SERVICE_QOS, state)
 
     # ------------------------------------------------------------------ for subclasses
 
@@ -175,7 +201,9 @@ class RobotNode(Node):
                 fill_always(response)
             return response
 
-        self.create_service(service_type, f"~/{name}", answer, qos_profile=SERVICE_QOS)
+        service = self.create_service(service_type, f"~/{name}", answer, qos_profile=SERVICE_QOS)
+        self._tell_events(service)
+        self._served.append(service)
 
     def listen(self, message_type: Any, topic: str, receive: Callable[[Any], None]) -> None:
         """Receive a stream of sensor data whose every fault is counted.
@@ -246,6 +274,13 @@ class RobotNode(Node):
         status.values = [KeyValue(key=key, value=value) for key, value in report.values.items()]
         self.log.flush()
         self._diagnostics.publish(DiagnosticArray(header=self.header(""), status=[status]))
+
+
+def _check_service_events(value: Any) -> None:
+    """Raise a ValueRangeError if the parameter `service_events` cannot be this."""
+    if value not in SERVICE_EVENTS:
+        allowed = ", ".join(SERVICE_EVENTS)
+        raise ValueRangeError(f"parameter service_events: got {value!r}; allowed: {allowed}")
 
 
 def _decoded(data: bytes, message_type: Any) -> Any:

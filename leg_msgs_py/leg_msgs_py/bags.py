@@ -24,13 +24,20 @@ from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from backports import zstd
-from leg_msgs_py.definitions import UnknownTypeError, message_definition
+from leg_msgs_py.definitions import (
+    SEPARATOR,
+    SERVICE_MARK,
+    UnknownTypeError,
+    message_definition,
+    service_of_event,
+)
 from leg_msgs_py.mcap_scan import MAGIC as MCAP_MAGIC
 from leg_msgs_py.mcap_scan import Channel, McapDamageError, McapScan
 from rosbags.interfaces import (
     ConnectionExtRosbag2,
     MessageDefinition,
     MessageDefinitionFormat,
+    Nodetype,
     Qos,
     QosDurability,
     QosHistory,
@@ -69,6 +76,19 @@ FORMATS = {
     "omgidl": MessageDefinitionFormat.IDL,
 }
 NO_DEFINITION = MessageDefinition(MessageDefinitionFormat.NONE, "")
+EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+# What all service events have. rosbag2 leaves it out of definitions. Where ROS says char here and
+# means uint8, the parser understands something else, which has another hash.
+EVENT_INFO_TEXT = f"""\
+uint8 event_type
+builtin_interfaces/Time stamp
+uint8[16] client_gid
+int64 sequence_number
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
 FOREVER = QosTime(9223372036, 854775807)  # how rosbag2 writes a duration without end
 
 
@@ -326,7 +346,7 @@ def installed_types(names: Iterable[str]) -> Typestore:
     """
     types = get_typestore(Stores.EMPTY)
     for name in names:
-        types.register(get_types_from_msg(message_definition(name).text, name))
+        types.register(_types_of_text(message_definition(name).text, name))
     return types
 
 
@@ -356,7 +376,7 @@ def _defined_types(topic: Topic) -> Any:
     if not text:
         return {}
     if form == MessageDefinitionFormat.MSG:
-        return get_types_from_msg(text, topic.type)
+        return _types_of_text(text, topic.type)
     if form == MessageDefinitionFormat.IDL:
         parts = re.split(r"^={80}\nIDL: .*\n", text, flags=re.MULTILINE)
         return {
@@ -365,6 +385,36 @@ def _defined_types(topic: Topic) -> Any:
             for name, fields in get_types_from_idl(part).items()
         }
     return {}
+
+
+def _types_of_text(text: str, name: str) -> dict[str, Any]:
+    """Return the types of the definition of a message, or of a service that stands for its events.
+
+    Raises:
+        TypesysError: If it is no such definition.
+    """
+    service = service_of_event(name)
+    if service is None:
+        return get_types_from_msg(text, name)
+    parts = text.split(f"{SEPARATOR}\n")[1:]
+    halves = re.split(r"^---\s*$", parts[0], flags=re.MULTILINE) if parts else []
+    if len(halves) != 2 or not parts[0].startswith(SERVICE_MARK):
+        raise TypesysError(f"no definition of the service {service}")
+    halves[0] = halves[0].partition("\n")[2]
+    # The parser knows messages only: of the same package, so that it finds what they refer to.
+    alias = service.replace("/srv/", "/msg/")
+    found: dict[str, Any] = {}
+    for half, kind in zip(halves, ("Request", "Response"), strict=True):
+        types = get_types_from_msg(f"{SEPARATOR}\n".join([half, *parts[1:]]), alias)
+        found[f"{service}_{kind}"] = types.pop(alias)
+        found |= types
+    found |= get_types_from_msg(EVENT_INFO_TEXT, EVENT_INFO)
+    contents = [
+        (kind.lower(), (Nodetype.SEQUENCE, ((Nodetype.NAME, f"{service}_{kind}"), 1)))
+        for kind in ("Request", "Response")
+    ]
+    found[name] = ([], [("info", (Nodetype.NAME, EVENT_INFO)), *contents])
+    return found
 
 
 # --------------------------------------------------------------------------- files

@@ -32,6 +32,7 @@ SUITE_TOPICS = (
     *("*/joint_states", "*/wrench", "*/statics/*", "*/maps/*"),
     *("*/tf", "*/tf_static", "*/robot_description", "/diagnostics", "/clock"),
 )
+SERVICE_EVENTS = "/_service_event"  # the only hidden topics that are recorded
 # The middleware keeps this many messages for a reader that is late; beyond, it forgets silently.
 DEPTH = 10_000
 DISCOVERY_PERIOD = 0.1  # [s]
@@ -75,7 +76,7 @@ class Recorder(Node):
                 self._remark(f"{topic}: only its messages of {kept} are recorded, not of {others}")
 
     def _is_wanted(self, topic: str) -> bool:
-        hidden = "/_" in topic
+        hidden = "/_" in topic.removesuffix(SERVICE_EVENTS)
         return not hidden and any(fnmatchcase(topic, pattern) for pattern in self._patterns)
 
     def _begin(self, topic: str) -> None:

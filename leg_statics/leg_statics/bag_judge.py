@@ -39,16 +39,21 @@ class Topics(NamedTuple):
     """Where the inputs of the judge are in a recording.
 
     Attributes:
-        joint_states: Joint states.
+        joint_states: Joint states; "" for none.
         efforts: Joint states whose efforts count instead; "" for those of `joint_states`.
         wrenches: Wrench that the ground applies to the foot, by leg.
-        effort_limits: Limits that a node put in force, if they were recorded.
+        node: Name of the node whose effort limits count, if they were recorded.
     """
 
     joint_states: str = "/joint_states"
     efforts: str = ""
     wrenches: Mapping[str, str] = {}
-    effort_limits: str = "/statics/effort_limits"
+    node: str = "/statics"
+
+    @property
+    def effort_limits(self) -> str:
+        """Limits that the node put in force."""
+        return f"{self.node}/effort_limits"
 
     def check(self, bag: Bag) -> set[str]:
         """Return the topics to read from a recording.
@@ -56,8 +61,7 @@ class Topics(NamedTuple):
         Raises:
             ValueRangeError: If a topic is not in it, or has another type of messages.
         """
-        wanted = {self.joint_states: JOINT_STATE}
-        wanted |= {self.efforts: JOINT_STATE} if self.efforts else {}
+        wanted = dict.fromkeys(filter(None, (self.joint_states, self.efforts)), JOINT_STATE)
         wanted |= dict.fromkeys(self.wrenches.values(), WRENCH)
         wanted |= {self.effort_limits: LIMITS} if self.effort_limits in bag.topics else {}
         for name, kind in wanted.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import DescriptionError
 from leg_kinematics.requests import LegFrame, RequestError
 from leg_kinematics.robot import Leg
-from leg_kinematics.robot_node import RobotNode
 from leg_statics.footholds import Contact
 from leg_statics.grounds import Grounds, load_grounds
+
+if TYPE_CHECKING:  # requests are read without ROS, too
+    from leg_kinematics.robot_node import RobotNode
 
 LEVEL = np.array([0.0, 0.0, 1.0])
 

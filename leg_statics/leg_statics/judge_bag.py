@@ -1,9 +1,9 @@
 """Command `judge_bag`: what a recording tells about the legs, without ROS running.
 
-Every joint state of a rosbag2 recording (folder or file; mcap or sqlite3; split, compressed or
-damaged) goes through the same code as in the statics node. Written are a table with a row for each
-leg and joint state, a report with curves and the worst moments, and on request a copy of the
-recording with the leg states added.
+Every joint state and every planner's query of a rosbag2 recording (folder or file; mcap or sqlite3;
+split, compressed or damaged) goes through the same code as in the statics node. Written are a table
+with a row for each leg and joint state, one with a row for each query, a report with curves and the
+worst moments, and on request a copy of the recording with the leg states added.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from leg_msgs_py.bags import SUFFIXES, Bag, BagError, BagMessage
+from leg_msgs_py.bags import SUFFIXES, Bag, BagError
 from leg_msgs_py.definitions import UnknownTypeError
 from tqdm import tqdm
 
 from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError, ValueRangeError
 from leg_statics import judge_report, judge_table
-from leg_statics.bag_judge import BagJudge, Judgement, Topics
+from leg_statics.bag_judge import BagJudge, Topics
 from leg_statics.command_line import ArgumentParser
 from leg_statics.diagnostic_log import DIAGNOSTICS, DiagnosticLog
-from leg_statics.grounds import load_grounds
+from leg_statics.grounds import Grounds, load_grounds
 from leg_statics.judge_findings import Findings
 from leg_statics.judge_report import Case, picture_files, write_report
-from leg_statics.judge_table import JudgeTable
+from leg_statics.judge_table import JudgeTable, QueryTable
 from leg_statics.judged_bag import JudgedBag
+from leg_statics.query_judge import QueryFindings, QueryJudge
 
 EXAMPLES = """\
 examples:
@@ -48,14 +49,26 @@ examples:
   %(prog)s walk --output-bag walk_with_leg_states
 """
 
+JOINT_STATES = "/joint_states"
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 
 class Sink(Protocol):
-    """What takes judgements as they come."""
+    """What takes judgements, of joint states or of queries, as they come."""
 
-    def add(self, judgements: Sequence[Judgement]) -> None:
+    def add(self, judgements: Sequence[Any]) -> None:
         """Take up judgements."""
+
+
+class Source(Protocol):
+    """What judges messages."""
+
+    @property
+    def full(self) -> bool:
+        """Whether so much waits that it should be judged now."""
+
+    def judge(self) -> Sequence[Any]:
+        """Return new judgements."""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -90,7 +103,9 @@ def make_parser() -> argparse.ArgumentParser:
 
     topics = parser.add_argument_group("topics")
     topics.add_argument(
-        "--joint-states", default="/joint_states", metavar="TOPIC", help="default: %(default)s"
+        "--joint-states",
+        metavar="TOPIC",
+        help="default: /joint_states; none if there are only queries",
     )
     topics.add_argument(
         "--efforts",
@@ -106,6 +121,13 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="LEG=TOPIC",
         help="wrench of the ground on a foot (geometry_msgs/WrenchStamped), once for each leg; its "
         "frame turns it and its moment is about the foot",
+    )
+    topics.add_argument(
+        "--node",
+        default="/statics",
+        metavar="NAME",
+        help="node whose effort limits count and whose queries are judged (default: %(default)s); "
+        "queries are recorded if its parameter service_events is 'contents'",
     )
     topics.add_argument(
         "--contact-force",
@@ -127,7 +149,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--table",
         type=Path,
         metavar="FILE",
-        help=f"table, {' or '.join(judge_table.SUFFIXES)} (default: BAG_judged.parquet)",
+        help=f"table, {' or '.join(judge_table.SUFFIXES)} (default: BAG_judged.parquet); that of "
+        "the queries stands beside it, as BAG_judged_queries.parquet",
     )
     where.add_argument(
         "--report",
@@ -174,6 +197,7 @@ def _run(options: argparse.Namespace) -> list[Path]:
     for suffix in SUFFIXES:
         name = name.removesuffix(suffix)
     table = options.table or Path(f"{name}_judged.parquet")
+    query_table = table.with_name(f"{table.stem}_queries{table.suffix}")
     report = options.report or Path(f"{name}_judged.html")
     outputs = [table, report, *([options.output_bag] if options.output_bag else [])]
     judge_table.check_suffix(table)
@@ -182,15 +206,24 @@ def _run(options: argparse.Namespace) -> list[Path]:
         if not 0.0 < value < math.inf:
             raise ValueRangeError(f"{option}: got {value:g}; allowed: > 0")
     robot = load_robot(options.robot)
-    ground, friction = _ground(options)
-    pictures = picture_files(report, robot.legs).values() if report.suffix == ".md" else ()
+    grounds = load_grounds(options.grounds)
+    ground, friction = _ground(options, grounds)
+    bag = Bag(options.bag)
+    queries = QueryJudge(bag, grounds, options.node)
+    outputs += [query_table] if queries.inputs else []
+    shown = [*robot.legs, *queries.services]
+    pictures = picture_files(report, shown).values() if report.suffix == ".md" else ()
     for path in (*outputs, *pictures):
         _check_output(path, options)
 
-    bag = Bag(options.bag)
-    topics = Topics(options.joint_states, options.efforts, _by_leg(options.wrench))
+    topics = Topics(
+        _joint_states(options, bag, queries),
+        options.efforts,
+        _by_leg(options.wrench),
+        options.node,
+    )
     judge = BagJudge(bag, robot, friction, topics, options.contact_force, options.gap)
-    findings, log = Findings(robot, friction), DiagnosticLog()
+    findings, query_findings, log = Findings(robot, friction), QueryFindings(), DiagnosticLog()
     with _drafts(outputs) as drafts:
         with ExitStack() as stack:
             sinks: list[Sink] = [findings, stack.enter_context(JudgeTable(drafts[table], robot))]
@@ -198,9 +231,14 @@ def _run(options: argparse.Namespace) -> list[Path]:
             if options.output_bag:
                 copy = JudgedBag(drafts[options.output_bag], bag, robot, options.leg_states)
                 sinks.append(stack.enter_context(copy))
-            _judge(bag, judge, log, sinks, copy)
-            _check_judged(bag, judge)
-        write_report(drafts[report], Case(bag, judge, ground, friction, findings, log))
+            query_sinks: list[Sink] = [query_findings]
+            if queries.inputs:
+                query_sinks.append(stack.enter_context(QueryTable(drafts[query_table])))
+            _judge(bag, judge, queries, log, sinks, query_sinks, copy)
+            if not query_findings.tallies:
+                _check_judged(bag, judge)
+        case = Case(bag, judge, ground, friction, findings, queries, query_findings, log)
+        write_report(drafts[report], case)
     for damage in bag.damages.values():
         print(
             f"judge_bag: warning: {damage.file} is damaged: {damage.reason}; "
@@ -213,36 +251,42 @@ def _run(options: argparse.Namespace) -> list[Path]:
 
 
 def _judge(
-    bag: Bag, judge: BagJudge, log: DiagnosticLog, sinks: Sequence[Sink], copy: JudgedBag | None
+    bag: Bag,
+    judge: BagJudge,
+    queries: QueryJudge,
+    log: DiagnosticLog,
+    sinks: Sequence[Sink],
+    query_sinks: Sequence[Sink],
+    copy: JudgedBag | None,
 ) -> None:
     """Read the recording once, and hand what the judge says to the sinks."""
     chosen = {t.name for t in bag.topics.values() if copy or t.type == DIAGNOSTICS}
-    chosen |= judge.inputs
+    chosen |= judge.inputs | queries.inputs
     total = sum(bag.counts[topic] for topic in chosen)
     with tqdm(total=total, desc="judging", unit="message", unit_scale=True, disable=None) as bar:
         for message in bag.messages(chosen):
             judge.take(message)
-            if message.type == DIAGNOSTICS:
-                _take_diagnostics(bag, judge, log, message)
+            try:
+                queries.take(message, judge.robot)
+                if message.type == DIAGNOSTICS:
+                    log.add(message.time, bag.decode(message))
+            except BagError as error:
+                judge.tally.refuse(str(error))
             if copy:
                 copy.take(message)
             if judge.full or (copy and copy.full):
                 _hand_over(judge, sinks)
+            if queries.full:
+                _hand_over(queries, query_sinks)
             bar.update()
         _hand_over(judge, sinks)
+        _hand_over(queries, query_sinks)
 
 
-def _hand_over(judge: BagJudge, sinks: Sequence[Sink]) -> None:
-    judgements = judge.judge()
+def _hand_over(source: Source, sinks: Sequence[Sink]) -> None:
+    judgements = source.judge()
     for sink in sinks:
         sink.add(judgements)
-
-
-def _take_diagnostics(bag: Bag, judge: BagJudge, log: DiagnosticLog, message: BagMessage) -> None:
-    try:
-        log.add(message.time, bag.decode(message))
-    except BagError as error:
-        judge.tally.refuse(str(error))
 
 
 # --------------------------------------------------------------------------- what is asked for
@@ -269,10 +313,17 @@ def _by_leg(wrenches: Sequence[tuple[str, str]]) -> dict[str, str]:
     return dict(wrenches)
 
 
-def _ground(options: argparse.Namespace) -> tuple[str, float]:
+def _joint_states(options: argparse.Namespace, bag: Bag, queries: QueryJudge) -> str:
+    """Return the topic of joint states; "" if only queries were recorded."""
+    if options.joint_states is not None:
+        return str(options.joint_states)
+    return "" if queries.inputs and JOINT_STATES not in bag.topics else JOINT_STATES
+
+
+def _ground(options: argparse.Namespace, grounds: Grounds) -> tuple[str, float]:
     """Return name and friction coefficient of the ground."""
     if options.friction is None:
-        ground = load_grounds(options.grounds).find(options.ground)
+        ground = grounds.find(options.ground)
         return ground.name, ground.friction_low
     if not 0.0 <= options.friction < math.inf:
         raise ValueRangeError(f"--friction: got {options.friction:g}; allowed: finite and >= 0")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import html
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -24,12 +25,15 @@ from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.status import Status
 from leg_statics.bag_judge import BagJudge
 from leg_statics.diagnostic_log import DiagnosticLog, level_name
+from leg_statics.footholds import Verdict
 from leg_statics.judge_findings import Envelope, Findings, Quantity
+from leg_statics.query_judge import Query, QueryFindings, QueryJudge
 
 SUFFIXES = (".html", ".md")
 # Okabe and Ito's colours, told apart by colour-blind readers too; every curve has its own dashes.
 STYLES = (("#0072B2", "-"), ("#D55E00", "--"), ("#009E73", "-."), ("#CC79A7", ":"))
 BREAK = 20  # a pause of so many usual bins interrupts a curve
+UNITS = {"query_footholds": "N", "query_step_length": "m"}  # of the best answer
 MOST_DETAILS = 20  # lines of a list that can grow with the recording
 
 LEGEND = (
@@ -39,7 +43,8 @@ LEGEND = (
     "Load capacity: greatest vertical ground reaction within the effort limits on this ground. "
     "Rated friction: what the ground must offer along the walking direction at full efforts.",
     "The leg's own weight and dynamics are left out, as in the statics node.",
-    "Recorded requests of planners (service events) are not judged.",
+    "Answers to planners' queries are found anew, with this robot, these grounds and the recorded "
+    "effort limits. They are the same if no number is off by more than 1e-9, relative or absolute.",
 )
 
 PAGE = """\
@@ -71,7 +76,9 @@ class Case(NamedTuple):
         judge: The judge, when it has seen all.
         ground: Name of the ground, or how its friction was given.
         friction: Friction coefficient of the ground.
-        findings: What stands out.
+        findings: What stands out in joint states.
+        queries: The judge of queries, when it has seen all.
+        query_findings: What stands out in queries.
         diagnostics: The components' own words.
     """
 
@@ -80,6 +87,8 @@ class Case(NamedTuple):
     ground: str
     friction: float
     findings: Findings
+    queries: QueryJudge
+    query_findings: QueryFindings
     diagnostics: DiagnosticLog
 
 
@@ -89,24 +98,24 @@ def check_suffix(path: Path) -> None:
         raise ValueRangeError(f"report {path}: got {path.suffix!r}; allowed: {', '.join(SUFFIXES)}")
 
 
-def picture_files(path: Path, legs: Iterable[str]) -> dict[str, Path]:
-    """Return the files of the pictures that stand beside a Markdown report, by leg."""
-    return {leg: path.with_name(f"{path.stem}_{leg}.png") for leg in legs}
+def picture_files(path: Path, shown: Iterable[str]) -> dict[str, Path]:
+    """Return the files of the pictures that stand beside a Markdown report, by what they show."""
+    return {name: path.with_name(f"{path.stem}_{name}.png") for name in shown}
 
 
 def write_report(path: Path, case: Case) -> None:
     """Write the report, as HTML or Markdown by its suffix."""
-    pictures = {leg: _picture(case, leg) for leg in case.findings.curves}
+    pictures = _pictures(case)
     if path.suffix == ".md":
         files = picture_files(path, pictures)
-        for leg, file in files.items():
-            file.write_bytes(pictures[leg])
-        links = {leg: file.name for leg, file in files.items()}
+        for name, file in files.items():
+            file.write_bytes(pictures[name])
+        links = {name: file.name for name, file in files.items()}
         path.write_text(report_text(case, links), encoding="utf-8")
         return
     links = {
-        leg: f"data:image/png;base64,{base64.b64encode(picture).decode()}"
-        for leg, picture in pictures.items()
+        name: f"data:image/png;base64,{base64.b64encode(picture).decode()}"
+        for name, picture in pictures.items()
     }
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     body = markdown.render(report_text(case, links))
@@ -122,9 +131,9 @@ def report_text(case: Case, pictures: Mapping[str, str]) -> str:
 
     Args:
         case: What it tells.
-        pictures: Links to the pictures by leg.
+        pictures: Links to the pictures by the leg or service that they show.
     """
-    clock = _Clock(case.bag.start)
+    clock, judged = _Clock(case.bag.start), case.judge.tally.judged
     parts = [
         f"# Judgement of {_cell(case.bag.path.name)}",
         f"Robot: {case.judge.robot.name}. Ground: {case.ground}, friction {case.friction:g}.",
@@ -133,16 +142,15 @@ def report_text(case: Case, pictures: Mapping[str, str]) -> str:
         *_recording(case),
         "## Joint states",
         *_inputs(case, clock),
-        "## Legs",
-        *_legs(case),
-        "## Worst moments",
-        *_moments(case, clock),
+        *(["## Legs", *_legs(case), "## Worst moments", *_moments(case, clock)] if judged else []),
+        "## Queries of planners",
+        *_queries(case, clock),
         "## Diagnostics",
         *_diagnostics(case, clock),
         "## Curves",
         "Bands span the least and the greatest value of successive samples; distances are 0 at the "
         "limit.",
-        *(f"### {leg}\n\n![{leg}]({link})" for leg, link in pictures.items()),
+        *(f"### {name}\n\n![{name}]({link})" for name, link in pictures.items()),
         "## How to read it",
         _bullets(LEGEND),
     ]
@@ -173,6 +181,13 @@ def headlines(case: Case) -> list[str]:
                 f"**Beyond {quantity.limit:g}: {quantity.label}** of {', '.join(legs)}; "
                 f"at worst {_number(worst.value)} ({worst.leg}, {clock.at(worst.time)})."
             )
+    for what, queries in _standing_out(case.query_findings):
+        if queries:
+            first = queries[0]
+            lines.append(
+                f"{what}, the first {first.service} of {_cell(first.legs) or 'all legs'} at "
+                f"{clock.at(first.time)}."
+            )
     return lines or ["Nothing is beyond its limits."]
 
 
@@ -189,11 +204,16 @@ def _recording(case: Case) -> list[str]:
             [(t.name, t.type, bag.counts[t.name]) for t in sorted(bag.topics.values())],
         )
     )
+    if refused := case.judge.tally.refused:
+        rows = refused.most_common(MOST_DETAILS)
+        lines.append(_table(("refused because", "messages"), rows))
     return lines
 
 
 def _inputs(case: Case, clock: _Clock) -> list[str]:
     tally, topics = case.judge.tally, case.judge.topics
+    if not topics.joint_states:
+        return ["None were recorded."]
     count = case.bag.counts[topics.joint_states]
     lines = [f"{count} on {topics.joint_states}, {tally.judged} judged."]
     if tally.first is not None and tally.last is not None and tally.last > tally.first:
@@ -213,9 +233,6 @@ def _inputs(case: Case, clock: _Clock) -> list[str]:
     if tally.missing:
         rows = tally.missing.most_common(MOST_DETAILS)
         lines.append(_table(("leg not updated", "messages"), rows))
-    if tally.refused:
-        rows = tally.refused.most_common(MOST_DETAILS)
-        lines.append(_table(("refused because", "messages"), rows))
     return lines
 
 
@@ -242,6 +259,82 @@ def _moments(case: Case, clock: _Clock) -> list[str]:
         for moment in case.findings.worst(quantity)
     ]
     return [_table(("quantity", "value", "leg", "when [s]"), rows)]
+
+
+def _queries(case: Case, clock: _Clock) -> list[str]:
+    judge, findings = case.queries, case.query_findings
+    if not judge.inputs:
+        return ["None were recorded: the node's parameter service_events was not 'contents'."]
+    heads = ("service", "legs", "queries", "refused", "points", "feasible", "best", "time [ms]")
+    services = [
+        (
+            service,
+            legs or "all",
+            tally.queries,
+            tally.refused,
+            tally.points,
+            f"{tally.feasible} ({100.0 * tally.feasible / tally.points:.1f} %)"
+            if tally.points
+            else 0,
+            f"{_number(tally.least)} to {_number(tally.greatest)} {UNITS[service]}"
+            if tally.feasible
+            else "none",
+            f"{1e3 * tally.seconds / tally.queries:.2f}, at most {1e3 * tally.longest:.2f}",
+        )
+        for (service, legs), tally in sorted(findings.tallies.items())
+    ]
+    lines = [
+        _table(heads, services),
+        "Points are candidate footholds, or legs times heights. Best is the load capacity of the "
+        "best foothold, or the longest common step. Time is from the request to the response.",
+    ]
+    verdicts = sum((tally.verdicts for tally in findings.tallies.values()), Counter[Verdict]())
+    if verdicts:
+        counts = [(verdict.name, count) for verdict, count in sorted(verdicts.items())]
+        lines.append(_table(("verdict", "footholds"), counts))
+    total, exact, same = (
+        sum(getattr(tally, name) for tally in findings.tallies.values())
+        for name in ("queries", "exact", "same")
+    )
+    lines.append(
+        f"Of {total} answers, {same} are the same as recorded, {exact} of them bit for bit; "
+        f"{total - same} differ."
+    )
+    for count, what in (
+        (judge.unanswered, "requests without a recorded response are not judged."),
+        (judge.without_request, "responses without a recorded request are not judged."),
+        (judge.without_contents, "requests were recorded without their contents."),
+    ):
+        if count:
+            lines.append(f"{count} {what}")
+    for what, queries in _standing_out(findings):
+        if queries:
+            rows = [
+                (query.service, query.legs or "all", clock.at(query.time), _remark(query))
+                for query in queries
+            ]
+            lines += [f"{what}:", _table(("service", "legs", "when [s]", "what"), rows)]
+    return lines
+
+
+def _standing_out(findings: QueryFindings) -> list[tuple[str, list[Query]]]:
+    """Return the queries that stand out, by what they have in common."""
+    return [
+        ("**Answers that are not as recorded**", findings.different),
+        ("Queries that were refused", findings.refused),
+        ("Queries without a feasible foothold or step", findings.hopeless),
+    ]
+
+
+def _remark(query: Query) -> str:
+    """Return what is remarkable about a query."""
+    if query.difference:
+        difference = query.difference
+        return f"{difference.field}: {difference.expected} recorded, {difference.got} found"
+    if query.refused:
+        return f"{query.refused}: {query.reason}"
+    verdicts = sorted(query.answer.verdicts.items())
+    return ", ".join(f"{count} {verdict.name}" for verdict, count in verdicts) or "no step"
 
 
 def _diagnostics(case: Case, clock: _Clock) -> list[str]:
@@ -312,12 +405,47 @@ def _cell(text: str) -> str:
 # --------------------------------------------------------------------------- pictures
 
 
-def _picture(case: Case, leg: str) -> bytes:
-    """Return the curves of a leg as PNG."""
-    figure = draw_leg(case.findings.curves[leg], case.bag.start, case.friction, title=leg)
+def _pictures(case: Case) -> dict[str, bytes]:
+    """Return the curves of legs and queries as PNG, by leg or service."""
+    start = case.bag.start
+    return {
+        **{
+            leg: _png(draw_leg(curves, start, case.friction, title=leg))
+            for leg, curves in case.findings.curves.items()
+        },
+        **{
+            service: _png(draw_queries(curves, start, service))
+            for service, curves in case.query_findings.curves.items()
+        },
+    }
+
+
+def _png(figure: Figure) -> bytes:
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     return buffer.getvalue()
+
+
+def draw_queries(curves: Envelope, start: int, service: str) -> Figure:
+    """Draw what a service was asked and answered over time.
+
+    Args:
+        curves: The curves of `QueryFindings`.
+        start: Time that counts as 0 [ns].
+        service: Name of the service.
+    """
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    bands = _Bands(curves, start)
+    labels = ("feasible share", f"best answer [{UNITS[service]}]", "time to response [ms]")
+    rows = figure.subplots(len(labels), 1, sharex=True)
+    for axes, name, label in zip(rows, curves.names, labels, strict=True):
+        bands.draw(axes, name, label, (STYLES[0][0], ""), marker=".")
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(color="0.9")
+    rows[-1].set_xlabel("time [s]")
+    figure.suptitle(service)
+    return figure
 
 
 def draw_leg(curves: Envelope, start: int, friction: float, *, title: str = "") -> Figure:
@@ -390,7 +518,9 @@ class _Bands:
         known = np.any(~np.isnan(self._low), axis=0)
         return [name for k, name in enumerate(self._names) if known[k] and name.startswith(prefix)]
 
-    def draw(self, axes: Axes, name: str, label: str, style: tuple[str, str]) -> None:
+    def draw(
+        self, axes: Axes, name: str, label: str, style: tuple[str, str], marker: str = ""
+    ) -> None:
         """Draw a curve if it has values."""
         if name not in self.known(name):
             return
@@ -400,7 +530,13 @@ class _Bands:
         axes.fill_between(self._times, low, high, color=colour, alpha=0.35, linewidth=0.0)
         for values, text in ((low, label), (high, None)):
             axes.plot(
-                self._times, values, color=colour, linestyle=dashes, linewidth=1.0, label=text
+                self._times,
+                values,
+                color=colour,
+                linestyle=dashes,
+                linewidth=1.0,
+                marker=marker,
+                label=text,
             )
 
 

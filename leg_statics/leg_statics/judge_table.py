@@ -1,4 +1,7 @@
-"""The table of a judged recording: a row for each leg at each joint state, as Parquet or CSV."""
+"""The tables of a judged recording, as Parquet or CSV.
+
+One has a row for each leg at each joint state, the other a row for each query of a planner.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,8 @@ from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot
 from leg_kinematics.status import Status
 from leg_statics.bag_judge import Judgement
+from leg_statics.footholds import Verdict
+from leg_statics.query_judge import Query
 
 SUFFIXES = (".parquet", ".csv")
 
@@ -72,8 +77,7 @@ class JudgeTable:
         check_suffix(path)
         self._robot = robot
         self._schema = _schema(robot)
-        writer = pa.csv.CSVWriter if path.suffix == ".csv" else pa.parquet.ParquetWriter
-        self._writer: Any = writer(path, self._schema)
+        self._writer = _writer(path, self._schema)
 
     def add(self, judgements: Sequence[Judgement]) -> None:
         """Write rows in the order of the joint states, those of one of them by leg."""
@@ -117,10 +121,67 @@ class JudgeTable:
         self._writer.close()
 
 
+class QueryTable:
+    """Writes judged queries as they come; use it in a `with` statement.
+
+    Args:
+        path: File to write, .parquet or .csv.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._schema = pa.schema(
+            [
+                _field("service", pa.string(), "", "name of the service"),
+                _field("legs", pa.string(), "", "legs of the request; empty: all, or the only one"),
+                _field("time", pa.int64(), "ns", "when the request was recorded"),
+                _field("seconds", pa.float64(), "s", "from the request to the response"),
+                _field("refused", pa.string(), "", "name of the recorded error, if any"),
+                _field("reason", pa.string(), "", "the message that came with it"),
+                _field("points", pa.int64(), "1", "candidate footholds, or legs times heights"),
+                _field("feasible", pa.int64(), "1", "those that are feasible, or have a step"),
+                _field("best", pa.float64(), "N or m", "load capacity, or longest common step"),
+                *(
+                    _field(verdict.name.lower(), pa.int64(), "1", "footholds with this verdict")
+                    for verdict in Verdict
+                    if verdict != Verdict.FEASIBLE
+                ),
+                _field("exact", pa.bool_(), "", "the answer is the recorded one, bit for bit"),
+                _field("difference", pa.string(), "", "first field that is not the recorded one"),
+            ]
+        )
+        self._writer = _writer(path, self._schema)
+
+    def add(self, queries: Sequence[Query]) -> None:
+        """Write a row for each query."""
+        rows = [
+            {
+                **query._asdict(),
+                **query.answer._asdict(),
+                **{each.name.lower(): query.answer.verdicts.get(each, 0) for each in Verdict},
+                "feasible": query.answer.feasible,
+                "difference": query.difference.field if query.difference else "",
+            }
+            for query in queries
+        ]
+        self._writer.write_table(pa.Table.from_pylist(rows, schema=self._schema))
+
+    def __enter__(self) -> QueryTable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()
+
+
 def check_suffix(path: Path) -> None:
     """Raise a ValueRangeError if a table cannot have this name."""
     if path.suffix not in SUFFIXES:
         raise ValueRangeError(f"table {path}: got {path.suffix!r}; allowed: {', '.join(SUFFIXES)}")
+
+
+def _writer(path: Path, schema: pa.Schema) -> Any:
+    """Return what writes a table, by the suffix of its file."""
+    kind = pa.csv.CSVWriter if path.suffix == ".csv" else pa.parquet.ParquetWriter
+    return kind(path, schema)
 
 
 def _schema(robot: Robot) -> pa.Schema:

@@ -23,7 +23,7 @@ from visualization_msgs.msg import MarkerArray
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
 from leg_kinematics.mechanism import Posture
-from leg_kinematics.requests import LegFrame, RequestError, check_count, find_frame
+from leg_kinematics.requests import POINT_FOOT, LegFrame, RequestError, check_count, find_frame
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.robot_node import RobotNode, run
 from leg_kinematics.status import Status
@@ -41,7 +41,6 @@ from leg_statics.markers import (
 )
 from leg_statics.warm_up import warm_up_statics
 
-AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -203,7 +202,7 @@ class MapsNode(RobotNode):
         Raises:
             LegError: If it cannot be computed.
         """
-        if leg.mechanism.task_coordinates != AXES:
+        if leg.mechanism.task_coordinates != POINT_FOOT:
             raise NotSupportedError(f"leg: {leg.name!r} has no point foot with x, y, z")
         nz, ny, nx = grid_shape(leg.mechanism, request.resolution)
         count = ny * nx * (1 if height is not None else nz)
@@ -281,7 +280,7 @@ class MapsNode(RobotNode):
         header, layer = self.header(self.robot.base_frame), self.value("marker_layer")
         note = f"no workspace drawn: {leg.name}"
         self.health.notes.pop(note, None)
-        if not layer or leg.mechanism.task_coordinates != AXES:
+        if not layer or leg.mechanism.task_coordinates != POINT_FOOT:
             return no_workspace_marker(header, leg)
         try:
             key = MapKey.of(

@@ -25,15 +25,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.errors import NotSupportedError, UnknownNameError
+from leg_kinematics.errors import UnknownNameError
 from leg_kinematics.mechanism import SI_UNITS, Posture, geometry_parameters
-from leg_kinematics.requests import RequestError, check_count, find_frame, read_rows
+from leg_kinematics.requests import POINT_FOOT, RequestError, check_count, find_frame, read_rows
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.robot_node import STREAM_QOS, RobotNode, run
 from leg_kinematics.status import Status
-from leg_statics.contacts import declare_grounds, read_bias, read_contact
+from leg_statics.contacts import declare_grounds
 from leg_statics.efforts import joint_efforts, utilisation
-from leg_statics.footholds import evaluate_footholds
+from leg_statics.foothold_requests import fill_footholds, standing_leg
 from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 from leg_statics.joint_layout import JointLayout
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStream, StampOrder
@@ -41,7 +41,6 @@ from leg_statics.leg_state import LegStates as States
 from leg_statics.step_requests import fill_step_length
 from leg_statics.warm_up import warm_up_statics
 
-AXES = ("x", "y", "z")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -99,7 +98,7 @@ class StaticsNode(RobotNode):
 
     def compute_efforts(self, request: Any, response: Any) -> None:
         """Fill the joint efforts that hold ground reactions."""
-        leg = self._standing_leg(request.leg)
+        leg = standing_leg(self.robot, request.leg)
         frame = find_frame(self.robot, leg, request.header.frame_id)
         posture = self._posture(leg, request)
         count = len(posture.status)
@@ -134,32 +133,8 @@ class StaticsNode(RobotNode):
 
     def query_footholds(self, request: Any, response: Any) -> None:
         """Fill what the leg can carry at candidate footholds."""
-        leg = self._standing_leg(request.leg)
-        frame = find_frame(self.robot, leg, request.header.frame_id)
-        contact = read_contact(self._grounds, request, frame)
-        contact = contact._replace(bias=read_bias(leg, request.bias_efforts))
-        positions = read_rows("positions", request.positions, leg.mechanism.task_coordinates)
-        check_count("positions", len(positions), self.value("max_points"))
-        found = evaluate_footholds(
-            leg.mechanism, leg.effort_limits, frame.points_to_leg(positions), contact
-        )
-        ranking = found.ranking()
         response.header = self.header(request.header.frame_id)
-        response.verdict = to_field(found.verdict, np.uint8)
-        response.status = to_field(found.posture.status, np.uint8)
-        response.load_capacity = to_field(found.load_capacity)
-        response.rated_friction = to_field(found.rated_friction)
-        response.rated_friction_full = to_field(found.rated_friction_full)
-        response.friction_margin = to_field(found.friction_margin)
-        response.utilisation = to_field(found.utilisation)
-        response.limiting_joint = to_field(found.limiting_joint, np.int32)
-        response.ranking = to_field(ranking, np.int32)
-        response.best = int(ranking[0]) if len(ranking) else -1
-        response.friction_coefficient = float(np.asarray(contact.friction))
-        if request.include_efforts:
-            response.joint_names = list(leg.joint_names)
-            response.joint_efforts = to_field(found.efforts)
-            response.forces = to_field(frame.vectors_from_leg(found.force))
+        fill_footholds(self.robot, self._grounds, self.value("max_points"), request, response)
 
     def query_step_length(self, request: Any, response: Any) -> None:
         """Fill the longest steps of legs, each and together."""
@@ -185,20 +160,6 @@ class StaticsNode(RobotNode):
 
     def _fill_limits(self, response: Any) -> None:
         response.limits = self._limits
-
-    def _standing_leg(self, name: str) -> Leg:
-        """Return a leg by its name.
-
-        Raises:
-            NotSupportedError: If it does not end in a foot that the ground could push.
-        """
-        leg = self.robot.leg(name)
-        if leg.mechanism.task_coordinates != AXES:
-            raise NotSupportedError(
-                f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
-                f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"
-            )
-        return leg
 
     def _posture(self, leg: Leg, request: Any) -> Posture:
         """Return the postures at the foot positions of a request."""
@@ -305,7 +266,7 @@ def _vectors(field: str, values: Any, count: int) -> FloatArray:
             f"{field}: got {len(values)} values; allowed: 3 (one vector for all points) or "
             f"{3 * count} (x, y, z of each of {count} points)"
         )
-    return np.broadcast_to(read_rows(field, values, AXES), (count, 3))
+    return np.broadcast_to(read_rows(field, values, POINT_FOOT), (count, 3))
 
 
 def _joint_rows(leg: Leg, names: Sequence[str]) -> list[int]:

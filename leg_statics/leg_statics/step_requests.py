@@ -11,13 +11,19 @@ from leg_msgs_py.arrays import from_field, to_field
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.requests import BaseFrame, LegFrame, RequestError, check_count, find_frame
+from leg_kinematics.requests import (
+    POINT_FOOT,
+    BaseFrame,
+    LegFrame,
+    RequestError,
+    check_count,
+    find_frame,
+)
 from leg_kinematics.robot import Leg, Mount, Robot
 from leg_statics.contacts import read_contact
 from leg_statics.grounds import Grounds
 from leg_statics.step_length import PROFILE_POINTS, CommonStep, Criterion, common_step
 
-AXES = ("x", "y", "z")
 BODY_FORWARD = (1.0, 0.0, 0.0)  # REP-103
 LEG_FORWARD = (0.0, 1.0, 0.0)
 
@@ -70,7 +76,7 @@ def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:
     """
     names = [leg.name for leg in legs]
     for leg in legs:
-        if leg.mechanism.task_coordinates != AXES:
+        if leg.mechanism.task_coordinates != POINT_FOOT:
             raise NotSupportedError(f"legs: {leg.name!r} has no point foot with x, y, z")
         if names.count(leg.name) > 1:
             raise RequestError(f"legs: {leg.name!r} is given twice; allowed: once each")
