@@ -16,14 +16,15 @@ from rosbags.highlevel import AnyReader
 
 from leg_kinematics import load_robot
 from leg_kinematics.status import Status
-from leg_statics import bag_judge, judge_findings
-from leg_statics.bag_judge import BagJudge, Judgement, Topics
 from leg_statics.capacity import load_capacity
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.indices import condition_number, rated_friction
 from leg_statics.joint_stream import JointStream
-from leg_statics.judge_bag import main
-from leg_statics.judge_findings import Findings
+from leg_statics.judge import bag_judge
+from leg_statics.judge import findings as judge_findings
+from leg_statics.judge.bag_judge import BagJudge, Judgement, Topics
+from leg_statics.judge.findings import Findings
+from leg_statics.judge.judge_bag import main
 
 BAGS = Path(__file__).parent / "bags"
 TRIPOD, TROT, FAULTS = BAGS / "hexapod_tripod", BAGS / "quadruped_trot", BAGS / "hexapod_faults"

@@ -17,12 +17,12 @@ from recorder_support import RecordProcess
 
 from leg_kinematics import load_robot
 from leg_kinematics.errors import ValueRangeError
-from leg_statics import query_judge
-from leg_statics.bag_judge import BagJudge, Topics
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.grounds import load_grounds
-from leg_statics.judge_bag import main
-from leg_statics.query_judge import QueryFindings, QueryJudge
+from leg_statics.judge import query_judge
+from leg_statics.judge.bag_judge import BagJudge, Topics
+from leg_statics.judge.judge_bag import main
+from leg_statics.judge.query_judge import QueryFindings, QueryJudge
 
 NODE = "/planner/statics"
 FOOTHOLDS, STEPS = (f"{NODE}/query_{what}/_service_event" for what in ("footholds", "step_length"))

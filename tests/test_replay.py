@@ -30,12 +30,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
 from leg_kinematics import Status, load_robot
-from leg_statics.bag_judge import BagJudge, Topics
 from leg_statics.capacity import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStateError, JointStream
-from leg_statics.judged_bag import JudgedBag
+from leg_statics.judge.bag_judge import BagJudge, Topics
+from leg_statics.judge.judged_bag import JudgedBag
 
 pytest_plugins = ["leg_msgs_py.pytest_replay"]
 

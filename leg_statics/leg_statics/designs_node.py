@@ -20,10 +20,10 @@ from leg_msgs_py.arrays import to_field
 from leg_kinematics.documents import Document
 from leg_kinematics.robot_node import RobotNode, run
 from leg_statics.goal_queue import GoalQueue
-from leg_statics.search_jobs import SearchJob
-from leg_statics.search_report import winner_robot
-from leg_statics.study import Study, study_from_document
-from leg_statics.workers import open_workers
+from leg_statics.search.jobs import SearchJob
+from leg_statics.search.report import winner_robot
+from leg_statics.search.study import Study, study_from_document
+from leg_statics.search.workers import open_workers
 
 
 @dataclass(frozen=True)

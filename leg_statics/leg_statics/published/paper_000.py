@@ -20,8 +20,8 @@ from leg_statics.footholds import Contact
 from leg_statics.global_means import means_on_grid
 from leg_statics.indices import INDICES, evaluate_indices
 from leg_statics.published.comparison import Comparison, compare_claim, compare_number
+from leg_statics.search.workers import LocalWorkers
 from leg_statics.step_length import Criterion, longest_step
-from leg_statics.workers import LocalWorkers
 
 PAPER = "000"
 

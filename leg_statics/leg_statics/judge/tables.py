@@ -18,9 +18,9 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot
 from leg_kinematics.status import Status
-from leg_statics.bag_judge import Judgement
 from leg_statics.footholds import Verdict
-from leg_statics.query_judge import Query
+from leg_statics.judge.bag_judge import Judgement
+from leg_statics.judge.query_judge import Query
 
 SUFFIXES = (".parquet", ".csv")
 

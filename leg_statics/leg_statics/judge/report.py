@@ -23,11 +23,11 @@ from matplotlib.ticker import LogFormatter
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.status import Status
-from leg_statics.bag_judge import BagJudge
-from leg_statics.diagnostic_log import DiagnosticLog, level_name
 from leg_statics.footholds import Verdict
-from leg_statics.judge_findings import Envelope, Findings, Quantity
-from leg_statics.query_judge import Query, QueryFindings, QueryJudge
+from leg_statics.judge.bag_judge import BagJudge
+from leg_statics.judge.diagnostic_log import DiagnosticLog, level_name
+from leg_statics.judge.findings import Envelope, Findings, Quantity
+from leg_statics.judge.query_judge import Query, QueryFindings, QueryJudge
 
 SUFFIXES = (".html", ".md")
 # Okabe and Ito's colours, told apart by colour-blind readers too; every curve has its own dashes.
@@ -73,11 +73,11 @@ class Case(NamedTuple):
 
     Attributes:
         bag: The recording.
-        judge: The judge, when it has seen all.
+        judge: The judge of joint states.
         ground: Name of the ground, or how its friction was given.
         friction: Friction coefficient of the ground.
         findings: What stands out in joint states.
-        queries: The judge of queries, when it has seen all.
+        queries: The judge of queries.
         query_findings: What stands out in queries.
         diagnostics: The components' own words.
     """
@@ -99,7 +99,9 @@ def check_suffix(path: Path) -> None:
 
 
 def picture_files(path: Path, shown: Iterable[str]) -> dict[str, Path]:
-    """Return the files of the pictures that stand beside a Markdown report, by what they show."""
+    """Return the files of the pictures beside a report, by what they show; HTML holds its own."""
+    if path.suffix != ".md":
+        return {}
     return {name: path.with_name(f"{path.stem}_{name}.png") for name in shown}
 
 

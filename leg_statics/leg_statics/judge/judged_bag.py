@@ -12,7 +12,7 @@ from leg_msgs_py.bags import Bag, BagMessage, BagWriter, installed_types, offere
 
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot
-from leg_statics.bag_judge import Judgement
+from leg_statics.judge.bag_judge import Judgement
 
 LEG_STATES = "leg_msgs/msg/LegStates"
 MOST_WAITING = 64 * 2**20  # of copied messages until the states between them are known [B]

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from leg_kinematics.arrays import FloatArray
 from leg_statics.designs import changed_mechanism, find_metric
-from leg_statics.geometry_search import Numbered, Outcome
 from leg_statics.indices import INDICES
 from leg_statics.maps import plane_map
 from leg_statics.plots import (
@@ -26,6 +25,7 @@ from leg_statics.plots import (
     is_spatial_leg,
     plot_maps,
 )
+from leg_statics.search.geometry_search import Numbered, Outcome
 
 MAP_RESOLUTION = 0.005  # m
 

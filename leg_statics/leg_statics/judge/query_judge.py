@@ -27,12 +27,14 @@ from leg_kinematics.robot import Robot
 from leg_statics.foothold_requests import fill_footholds
 from leg_statics.footholds import Verdict
 from leg_statics.grounds import Grounds
-from leg_statics.judge_findings import Envelope
+from leg_statics.judge.findings import Envelope
 from leg_statics.step_requests import fill_step_length
 
 REQUEST_RECEIVED, RESPONSE_SENT = 1, 2  # of service_msgs/ServiceEventInfo, told by the node
 MOST_WAITING = 1000  # requests without a response yet
 MOST_QUERIES = 4096  # that wait to be taken
+MOST_TALLIES = 100  # requests may name anything as legs
+OTHERS = "others"
 MOST_TOLD = 20  # of each kind of query that stands out
 EXACT, SAME = Tolerance(), Tolerance(absolute=1e-9, relative=1e-9)  # other machines round otherwise
 NO_ANSWER = ("header", "error")  # fields that tell when, and what went wrong
@@ -373,7 +375,9 @@ class QueryFindings:
             times = np.array([query.time for query in asked])
             self.curves[service].add(times, np.array([_curve_values(query) for query in asked]))
         for query in queries:
-            self.tallies[query.service, query.legs].add(query)
+            key = (query.service, query.legs)
+            known = key in self.tallies or len(self.tallies) < MOST_TALLIES
+            self.tallies[key if known else (query.service, OTHERS)].add(query)
             hopeless = query.answer.points and not query.answer.feasible
             for stands_out, told in (
                 (query.refused, self.refused),

@@ -13,9 +13,9 @@ from tqdm import tqdm
 
 from leg_kinematics.documents import shared_files
 from leg_kinematics.errors import LegError
-from leg_statics.geometry_search import GeometrySearch
-from leg_statics.study import Study, load_study
-from leg_statics.workers import open_workers
+from leg_statics.search.geometry_search import GeometrySearch
+from leg_statics.search.study import Study, load_study
+from leg_statics.search.workers import open_workers
 
 BAR_FORMAT = "{percentage:3.0f}% |{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 PERIOD, LOG_PERIOD = 0.1, 10.0  # of the progress in a terminal and in a log [s]
@@ -110,7 +110,7 @@ def _run(options: argparse.Namespace) -> None:
         )
         with ProgressBar(study) as bar:
             outcome = GeometrySearch(study, folder, bar.show).run(workers)
-    from leg_statics.search_report import summary, write_results  # slow to import
+    from leg_statics.search.report import summary, write_results  # slow to import
 
     print("\n".join(summary(outcome)))
     if outcome.winner is None:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from leg_statics.designs import find_metric
-from leg_statics.geometry_search import TABLE, Numbered, Outcome, write_text
-from leg_statics.improved_robot import improved_robot
-from leg_statics.search_plots import draw_search
+from leg_statics.search.geometry_search import TABLE, Numbered, Outcome, write_text
+from leg_statics.search.improved_robot import improved_robot
+from leg_statics.search.plots import draw_search
 
 REPORT, WINNER = "report.md", "winner.yaml"
 RESOLUTION = 200  # dots per inch

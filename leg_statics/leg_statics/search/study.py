@@ -55,7 +55,7 @@ from leg_statics.designs import (
     supported_metrics,
 )
 from leg_statics.grounds import load_grounds
-from leg_statics.search_methods import METHODS, Draw
+from leg_statics.search.methods import METHODS, Draw
 from leg_statics.step_length import Criterion
 
 VERSION = 1

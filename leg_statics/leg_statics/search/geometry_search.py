@@ -25,11 +25,11 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.documents import Document
 from leg_kinematics.errors import LegError
-from leg_statics.design_table import Design, DesignTable
-from leg_statics.pareto import ParetoFront
-from leg_statics.search_methods import INFEASIBLE, METHODS, Trial
-from leg_statics.study import DesignTask, Study
-from leg_statics.workers import Workers
+from leg_statics.search.design_table import Design, DesignTable
+from leg_statics.search.methods import INFEASIBLE, METHODS, Trial
+from leg_statics.search.pareto import ParetoFront
+from leg_statics.search.study import DesignTask, Study
+from leg_statics.search.workers import Workers
 
 Entry = TypeVar("Entry")
 

@@ -25,16 +25,14 @@ from tqdm import tqdm
 
 from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError, ValueRangeError
-from leg_statics import judge_report, judge_table
-from leg_statics.bag_judge import BagJudge, Topics
 from leg_statics.command_line import ArgumentParser
-from leg_statics.diagnostic_log import DIAGNOSTICS, DiagnosticLog
 from leg_statics.grounds import Grounds, load_grounds
-from leg_statics.judge_findings import Findings
-from leg_statics.judge_report import Case, picture_files, write_report
-from leg_statics.judge_table import JudgeTable, QueryTable
-from leg_statics.judged_bag import JudgedBag
-from leg_statics.query_judge import QueryFindings, QueryJudge
+from leg_statics.judge import report, tables
+from leg_statics.judge.bag_judge import BagJudge, Topics
+from leg_statics.judge.diagnostic_log import DIAGNOSTICS, DiagnosticLog
+from leg_statics.judge.findings import Findings
+from leg_statics.judge.judged_bag import JudgedBag
+from leg_statics.judge.query_judge import QueryFindings, QueryJudge
 
 EXAMPLES = """\
 examples:
@@ -149,14 +147,14 @@ def make_parser() -> argparse.ArgumentParser:
         "--table",
         type=Path,
         metavar="FILE",
-        help=f"table, {' or '.join(judge_table.SUFFIXES)} (default: BAG_judged.parquet); that of "
+        help=f"table, {' or '.join(tables.SUFFIXES)} (default: BAG_judged.parquet); that of "
         "the queries stands beside it, as BAG_judged_queries.parquet",
     )
     where.add_argument(
         "--report",
         type=Path,
         metavar="FILE",
-        help=f"report, {' or '.join(judge_report.SUFFIXES)} (default: BAG_judged.html)",
+        help=f"report, {' or '.join(report.SUFFIXES)} (default: BAG_judged.html)",
     )
     where.add_argument(
         "--output-bag", type=Path, metavar="FOLDER", help="copy with the leg states added"
@@ -196,12 +194,12 @@ def _run(options: argparse.Namespace) -> list[Path]:
     name = options.bag.resolve().name
     for suffix in SUFFIXES:
         name = name.removesuffix(suffix)
-    table = options.table or Path(f"{name}_judged.parquet")
-    query_table = table.with_name(f"{table.stem}_queries{table.suffix}")
-    report = options.report or Path(f"{name}_judged.html")
-    outputs = [table, report, *([options.output_bag] if options.output_bag else [])]
-    judge_table.check_suffix(table)
-    judge_report.check_suffix(report)
+    table_file = options.table or Path(f"{name}_judged.parquet")
+    query_file = table_file.with_name(f"{table_file.stem}_queries{table_file.suffix}")
+    report_file = options.report or Path(f"{name}_judged.html")
+    outputs = [table_file, report_file, *([options.output_bag] if options.output_bag else [])]
+    tables.check_suffix(table_file)
+    report.check_suffix(report_file)
     for option, value in (("--contact-force", options.contact_force), ("--gap", options.gap)):
         if not 0.0 < value < math.inf:
             raise ValueRangeError(f"{option}: got {value:g}; allowed: > 0")
@@ -210,10 +208,9 @@ def _run(options: argparse.Namespace) -> list[Path]:
     ground, friction = _ground(options, grounds)
     bag = Bag(options.bag)
     queries = QueryJudge(bag, grounds, options.node)
-    outputs += [query_table] if queries.inputs else []
-    shown = [*robot.legs, *queries.services]
-    pictures = picture_files(report, shown).values() if report.suffix == ".md" else ()
-    for path in (*outputs, *pictures):
+    outputs += [query_file] if queries.inputs else []
+    pictures = report.picture_files(report_file, [*robot.legs, *queries.services])
+    for path in (*outputs, *pictures.values()):
         _check_output(path, options)
 
     topics = Topics(
@@ -223,22 +220,32 @@ def _run(options: argparse.Namespace) -> list[Path]:
         options.node,
     )
     judge = BagJudge(bag, robot, friction, topics, options.contact_force, options.gap)
-    findings, query_findings, log = Findings(robot, friction), QueryFindings(), DiagnosticLog()
+    case = report.Case(
+        bag,
+        judge,
+        ground,
+        friction,
+        Findings(robot, friction),
+        queries,
+        QueryFindings(),
+        DiagnosticLog(),
+    )
     with _drafts(outputs) as drafts:
         with ExitStack() as stack:
-            sinks: list[Sink] = [findings, stack.enter_context(JudgeTable(drafts[table], robot))]
+            sinks: list[Sink] = [
+                case.findings,
+                stack.enter_context(tables.JudgeTable(drafts[table_file], robot)),
+            ]
             copy = None
             if options.output_bag:
                 copy = JudgedBag(drafts[options.output_bag], bag, robot, options.leg_states)
                 sinks.append(stack.enter_context(copy))
-            query_sinks: list[Sink] = [query_findings]
+            query_sinks: list[Sink] = [case.query_findings]
             if queries.inputs:
-                query_sinks.append(stack.enter_context(QueryTable(drafts[query_table])))
-            _judge(bag, judge, queries, log, sinks, query_sinks, copy)
-            if not query_findings.tallies:
-                _check_judged(bag, judge)
-        case = Case(bag, judge, ground, friction, findings, queries, query_findings, log)
-        write_report(drafts[report], case)
+                query_sinks.append(stack.enter_context(tables.QueryTable(drafts[query_file])))
+            _judge(case, sinks, query_sinks, copy)
+            _check_judged(case)
+        report.write_report(drafts[report_file], case)
     for damage in bag.damages.values():
         print(
             f"judge_bag: warning: {damage.file} is damaged: {damage.reason}; "
@@ -251,15 +258,13 @@ def _run(options: argparse.Namespace) -> list[Path]:
 
 
 def _judge(
-    bag: Bag,
-    judge: BagJudge,
-    queries: QueryJudge,
-    log: DiagnosticLog,
+    case: report.Case,
     sinks: Sequence[Sink],
     query_sinks: Sequence[Sink],
     copy: JudgedBag | None,
 ) -> None:
-    """Read the recording once, and hand what the judge says to the sinks."""
+    """Read the recording once, and hand what the judges say to the sinks."""
+    bag, judge, queries = case.bag, case.judge, case.queries
     chosen = {t.name for t in bag.topics.values() if copy or t.type == DIAGNOSTICS}
     chosen |= judge.inputs | queries.inputs
     total = sum(bag.counts[topic] for topic in chosen)
@@ -269,7 +274,7 @@ def _judge(
             try:
                 queries.take(message, judge.robot)
                 if message.type == DIAGNOSTICS:
-                    log.add(message.time, bag.decode(message))
+                    case.diagnostics.add(message.time, bag.decode(message))
             except BagError as error:
                 judge.tally.refuse(str(error))
             if copy:
@@ -330,10 +335,11 @@ def _ground(options: argparse.Namespace, grounds: Grounds) -> tuple[str, float]:
     return "as given", options.friction
 
 
-def _check_judged(bag: Bag, judge: BagJudge) -> None:
-    """Raise a ValueRangeError if no joint state could be judged."""
+def _check_judged(case: report.Case) -> None:
+    """Raise a ValueRangeError if neither a joint state nor a query could be judged."""
+    bag, judge = case.bag, case.judge
     tally, topic = judge.tally, judge.topics.joint_states
-    if tally.judged:
+    if tally.judged or case.query_findings.tallies:
         return
     reasons = [f"{reason} ({count} times)" for reason, count in tally.refused.most_common(1)]
     if tally.foreign:
@@ -345,7 +351,8 @@ def _check_judged(bag: Bag, judge: BagJudge) -> None:
         )
     reasons += [f"legs lack joints: {missing}" for missing in list(tally.missing)[:1]]
     why = "; ".join(reasons) or "it has no messages"
-    raise ValueRangeError(f"{bag.path}: nothing to judge on {topic}: {why}")
+    where = ", ".join(sorted({topic} - {""} | case.queries.inputs))
+    raise ValueRangeError(f"{bag.path}: nothing to judge on {where}: {why}")
 
 
 # --------------------------------------------------------------------------- outputs

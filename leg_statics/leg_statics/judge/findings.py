@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.robot import Robot
 from leg_kinematics.status import Status
-from leg_statics.bag_judge import Judgement
+from leg_statics.judge.bag_judge import Judgement
 
 WINDOW = 500_000_000  # of several bad moments in this time only the worst is told [ns]
 MOST_MOMENTS = 5  # told of each quantity

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from leg_statics.geometry_search import GeometrySearch, Outcome, Progress
-from leg_statics.search_report import write_results
-from leg_statics.study import Study
-from leg_statics.workers import Workers
+from leg_statics.search.geometry_search import GeometrySearch, Outcome, Progress
+from leg_statics.search.report import write_results
+from leg_statics.search.study import Study
+from leg_statics.search.workers import Workers
 
 
 class SearchJob:

@@ -1,0 +1,1 @@
+"""The judge of recordings: what they tell about the legs, in tables, reports and copies."""

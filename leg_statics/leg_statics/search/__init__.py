@@ -1,0 +1,1 @@
+"""The search for better legs: studies, methods, workers, tables and reports."""
