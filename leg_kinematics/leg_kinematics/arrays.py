@@ -5,7 +5,7 @@ Every public function takes arrays with any leading batch axes; only the trailin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,8 @@ def as_array(name: str, value: ArrayLike, *trailing: int) -> FloatArray:
         array: FloatArray = np.asarray(value, np.float64)
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} must be an array of numbers: {error}") from None
-    if trailing and array.shape[-len(trailing) :] != trailing:
+    shape = array.shape
+    if shape != trailing and shape[len(shape) - len(trailing) :] != trailing:  # one point first
         wanted = ", ".join(["...", *map(str, trailing)])
         raise ShapeError(f"{name} must have shape ({wanted}), got {array.shape}")
     return array
@@ -45,7 +46,7 @@ def as_vectors(name: str, value: ArrayLike, length: int) -> FloatArray:
         ShapeError: If it is not numeric or has another length.
     """
     array = as_array(name, value)
-    return array + np.zeros(length) if array.ndim == 0 else as_array(name, array, length)
+    return array.repeat(length) if array.ndim == 0 else as_array(name, array, length)
 
 
 def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: Any) -> FloatArray:
@@ -71,6 +72,19 @@ def as_matching(name: str, value: ArrayLike, trailing: tuple[int, ...], batch: A
             f"{name} has leading shape {leading}, which does not broadcast with {tuple(batch)}"
         ) from None
     return array
+
+
+def common_batch(shapes: Iterable[tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the shape to which shapes broadcast; quickly if at most one is not ().
+
+    Raises:
+        ValueError: If they do not broadcast.
+    """
+    different = set(shapes)
+    different.discard(())
+    if len(different) > 1:
+        return np.broadcast_shapes(*different)
+    return different.pop() if different else ()
 
 
 def broadcast_error(shapes: Mapping[str, tuple[int, ...]]) -> ShapeError:

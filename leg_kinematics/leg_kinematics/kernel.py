@@ -44,6 +44,8 @@ import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
 
+from leg_kinematics.arrays import common_batch
+
 # numpy's error model: a division by zero yields inf or NaN for that point, never an exception.
 scalar = numba.njit(error_model="numpy")
 # The same for short code without branches: loops of kernels take it in and compute several points
@@ -105,9 +107,10 @@ class Kernel:
         """Make all leading axes of the points one, and give the results the same axes back."""
         folded = list(arguments)
         shapes = [arguments[k].shape[: arguments[k].ndim - axes] for k, axes in self._of_points]
-        batch = _common_batch(shapes)
-        for (k, _), shape in zip(self._of_points, shapes, strict=True):
-            folded[k] = _folded(arguments[k], shape, batch)
+        batch = common_batch(shapes)
+        for (k, _), leading in zip(self._of_points, shapes, strict=True):
+            if leading != batch or len(batch) > 1:
+                folded[k] = _folded(arguments[k], leading, batch)
         results = self.gufunc(*folded)
         if len(batch) == 1:
             return results
@@ -132,13 +135,6 @@ class Kernel:
                 return decorate(self.function).ufunc  # numpy's, without numba's wrapper
             finally:
                 numba.config.CACHE_DIR = previous
-
-
-def _common_batch(shapes: list[tuple[int, ...]]) -> tuple[int, ...]:
-    """Return the shape to which shapes broadcast; quickly if there is but one besides ()."""
-    different = set(shapes)
-    different.discard(())
-    return different.pop() if len(different) == 1 else np.broadcast_shapes(*different)
 
 
 def _folded(array: Any, leading: tuple[int, ...], batch: tuple[int, ...]) -> Any:

@@ -22,6 +22,7 @@ from leg_kinematics.mechanism import (
 # keeps its x.
 VECTOR = np.array([-1.0, 1.0, 1.0])
 AXIAL = np.array([1.0, -1.0, -1.0])
+VECTOR_ROWS, AXIAL_ROWS = VECTOR[:, None], AXIAL[:, None]  # of Jacobians
 
 
 def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
@@ -76,17 +77,18 @@ class Mirrored:
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the actuators; see `Mechanism.inverse`."""
         foot = as_array("foot_position", foot_position, 3)
-        return _reflected(self.original.inverse(foot * VECTOR, assembly_mode))
+        q, closure, _, status = self.original.inverse(foot * VECTOR, assembly_mode)
+        return Posture(q, closure, foot, status)
 
     def inverse_with_jacobians(
         self, foot_position: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray, FloatArray]:
         """`inverse`, `jacobian` and `angular_jacobian` in one pass."""
         foot = as_array("foot_position", foot_position, 3)
-        posture, jacobian, angular = inverse_with_jacobians(
+        (q, closure, _, status), jacobian, angular = inverse_with_jacobians(
             self.original, foot * VECTOR, assembly_mode
         )
-        return _reflected(posture), VECTOR[:, None] * jacobian, AXIAL[:, None] * angular
+        return Posture(q, closure, foot, status), VECTOR_ROWS * jacobian, AXIAL_ROWS * angular
 
     def forward_with_jacobians(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
@@ -95,15 +97,15 @@ class Mirrored:
         posture, jacobian, angular = forward_with_jacobians(
             self.original, joint_positions, assembly_mode
         )
-        return _reflected(posture), VECTOR[:, None] * jacobian, AXIAL[:, None] * angular
+        return _reflected(posture), VECTOR_ROWS * jacobian, AXIAL_ROWS * angular
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of v = J q' (..., 3, n)."""
-        return VECTOR[:, None] * self.original.jacobian(_reflected(posture))
+        return VECTOR_ROWS * self.original.jacobian(_reflected(posture))
 
     def angular_jacobian(self, posture: Posture) -> FloatArray:
         """J_omega of omega = J_omega q' (..., 3, n)."""
-        return AXIAL[:, None] * self.original.angular_jacobian(_reflected(posture))
+        return AXIAL_ROWS * self.original.angular_jacobian(_reflected(posture))
 
     def acceleration(
         self, posture: Posture, joint_velocities: ArrayLike, joint_accelerations: ArrayLike

@@ -51,7 +51,7 @@ def read_ground(grounds: Grounds, ground: Any, frame: LegFrame) -> Contact:
         RequestError: If friction or normal are out of range.
     """
     normal = _finite("ground.normal", ground.normal) if any(ground.normal) else LEVEL
-    return Contact(_friction(grounds, ground), frame.vectors_to_leg(normal))
+    return Contact(_friction(grounds, ground), _numbers(frame.vectors_to_leg(normal)))
 
 
 def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
@@ -61,14 +61,15 @@ def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
         UnknownNameError: If it names an unknown ground.
         RequestError: If a value is out of range.
     """
+    moment = frame.vectors_to_leg(_finite("required_moment", request.required_moment))
     return read_ground(grounds, request.ground, frame)._replace(
         load=_magnitude("required_load", request.required_load, "N"),
-        moment=frame.vectors_to_leg(_finite("required_moment", request.required_moment)),
+        moment=_numbers(moment),
         any_moment=_magnitude("any_direction_moment", request.any_direction_moment, "N.m"),
     )
 
 
-def read_bias(leg: Leg, values: Any) -> FloatArray:
+def read_bias(leg: Leg, values: Any) -> tuple[float, ...]:
     """Return the efforts that the actuators of a leg exert anyway (n,).
 
     Raises:
@@ -80,7 +81,12 @@ def read_bias(leg: Leg, values: Any) -> FloatArray:
             f"bias_efforts: got {len(values)} values; allowed: {count} "
             f"({', '.join(leg.joint_names)}) or none"
         )
-    return _finite("bias_efforts", values) if len(values) else np.zeros(count)
+    return _numbers(_finite("bias_efforts", values)) if len(values) else (0.0,) * count
+
+
+def _numbers(vector: FloatArray) -> tuple[float, ...]:
+    """Return a vector as plain numbers: what is known of such a contact is kept."""
+    return tuple(vector.tolist())
 
 
 def _friction(grounds: Grounds, ground: Any) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,7 @@ from leg_kinematics.arrays import (
     as_non_negative,
     as_vectors,
     broadcast_error,
+    common_batch,
 )
 from leg_kinematics.blocks import (
     BLOCK,
@@ -28,9 +30,9 @@ from leg_kinematics.blocks import (
 )
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
 from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
-from leg_kinematics.mechanism import Mechanism, Posture
+from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
 from leg_kinematics.status import Status
-from leg_statics.capacity import UP, check_effort_limits, check_normals, difference, unit
+from leg_statics.capacity import check_effort_limits, check_normals, difference, unit
 from leg_statics.efforts import worst_moment_effort
 from leg_statics.indices import force_slopes
 from leg_statics.kinematics import Kinematics
@@ -65,14 +67,13 @@ class Verdict(IntEnum):
 FEASIBLE, FRICTION, EFFORT = int(Verdict.FEASIBLE), int(Verdict.FRICTION), int(Verdict.EFFORT)
 OK = int(Status.OK)
 WRONG_CONTACT = 255  # instead of a verdict, where the contact or a limit is out of range
-ZERO = np.zeros(3)
-ZERO.flags.writeable = False
 
 
 class Contact(NamedTuple):
     """What a foot stands on and what it has to bear.
 
-    Every field broadcasts with the candidates.
+    Every field broadcasts with the candidates. A contact of plain numbers and tuples is quickest
+    if it is used again.
 
     Attributes:
         friction: Friction coefficient mu of the ground (...,), 0 to infinity.
@@ -86,9 +87,9 @@ class Contact(NamedTuple):
     """
 
     friction: ArrayLike
-    normal: ArrayLike = UP
+    normal: ArrayLike = (0.0, 0.0, 1.0)
     load: ArrayLike = 0.0
-    moment: ArrayLike = ZERO
+    moment: ArrayLike = (0.0, 0.0, 0.0)
     any_moment: ArrayLike = 0.0
     bias: ArrayLike = 0.0
 
@@ -99,27 +100,65 @@ class Footholds(NamedTuple):
     Attributes:
         verdict: A `Verdict` each.
         posture: The solved postures.
-        load_capacity: Largest normal load [N]; infinite if the structure alone carries any load,
-            NaN without a posture, 0 if not even an unloaded foot can be held.
-        rated_friction: mu_e = |F_y / F_z|, equation (22).
-        rated_friction_full: sqrt(F_x² + F_y²) / F_z of the same force.
-        friction_margin: mu - mu_e.
-        force: Ground reaction of the required load that uses the actuators least (..., 3) [N].
-        efforts: Actuator efforts that hold it (..., n) [N.m or N].
-        utilisation: Largest share of an effort limit that they use.
-        limiting_joint: Index of that joint, -1 for none.
+        numbers: All else that was found, in columns (..., 9 + n); the properties name them.
     """
 
     verdict: StatusArray
     posture: Posture
-    load_capacity: FloatArray
-    rated_friction: FloatArray
-    rated_friction_full: FloatArray
-    friction_margin: FloatArray
-    force: FloatArray
-    efforts: FloatArray
-    utilisation: FloatArray
-    limiting_joint: NDArray[np.int32]
+    numbers: FloatArray
+
+    @property
+    def load_capacity(self) -> FloatArray:
+        """Largest normal load [N].
+
+        Infinite if the structure alone carries any load, NaN without a posture, 0 if not even an
+        unloaded foot can be held.
+        """
+        return self._column(CAPACITY)
+
+    @property
+    def rated_friction(self) -> FloatArray:
+        """mu_e = |F_y / F_z|, equation (22)."""
+        return self._column(MU_E)
+
+    @property
+    def rated_friction_full(self) -> FloatArray:
+        """sqrt(F_x² + F_y²) / F_z of the same force."""
+        return self._column(MU_FULL)
+
+    @property
+    def friction_margin(self) -> FloatArray:
+        """What the ground offers beyond the rated friction, mu - mu_e."""
+        return self._column(MARGIN)
+
+    @property
+    def utilisation(self) -> FloatArray:
+        """Largest share of an effort limit that the efforts use."""
+        return self._column(SHARE)
+
+    @property
+    def limiting_joint(self) -> NDArray[np.int32]:
+        """Index of that joint, -1 for none."""
+        return self._column(JOINT).astype(np.int32)
+
+    @property
+    def force(self) -> FloatArray:
+        """Ground reaction of the required load that uses the actuators least (..., 3) [N]."""
+        return self._columns(slice(FORCE - NUMBERS, OF_POINT - NUMBERS))
+
+    @property
+    def efforts(self) -> FloatArray:
+        """Actuator efforts that hold it (..., n) [N.m or N]."""
+        return self._columns(slice(OF_POINT - NUMBERS, None))
+
+    def _column(self, row: int) -> FloatArray:
+        """Return what stands in a row of the kernel's block; a number if there is one point."""
+        return self._columns(row - NUMBERS)
+
+    def _columns(self, which: int | slice) -> FloatArray:
+        """Return columns as a copy: whoever keeps them does not keep all the others."""
+        columns: FloatArray = self.numbers[..., which].copy()[()]
+        return columns
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -132,6 +171,8 @@ class Footholds(NamedTuple):
         Equal capacities are ordered by the rougher ground that they need.
         """
         feasible = np.flatnonzero(self.feasible)
+        if len(feasible) < 2:  # as in a request for one foothold
+            return feasible
         capacity = np.ravel(self.load_capacity)[feasible]
         order = np.argsort(-capacity, kind="stable")
         if np.any(np.diff(capacity[order]) == 0.0):  # rarely; it takes ten times as long
@@ -159,22 +200,72 @@ def evaluate_footholds(
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
     foot = as_array("foot_positions", foot_positions, len(mechanism.task_coordinates))
-    return judge_footholds(Kinematics.of_feet(mechanism, foot), effort_limits, contact)
+    posture, jacobian, angular = inverse_with_jacobians(mechanism, foot)
+    return _judged(mechanism, posture, jacobian, angular, effort_limits, contact)
 
 
 def judge_footholds(
     kinematics: Kinematics, effort_limits: ArrayLike, contact: Contact
 ) -> Footholds:
     """Evaluate solved postures as footholds; see `evaluate_footholds`."""
-    mechanism, posture = kinematics.mechanism, kinematics.posture
-    if len(mechanism.task_coordinates) != 3:
+    return _judged(
+        kinematics.mechanism,
+        kinematics.posture,
+        kinematics.jacobian,
+        kinematics.angular_jacobian,
+        effort_limits,
+        contact,
+    )
+
+
+def _judged(
+    mechanism: Mechanism,
+    posture: Posture,
+    jacobian: FloatArray,
+    angular_jacobian: FloatArray,
+    effort_limits: ArrayLike,
+    contact: Contact,
+) -> Footholds:
+    tasks, n = jacobian.shape[-2:]
+    if tasks != 3:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has task coordinates "
             f"{', '.join(mechanism.task_coordinates)}: load capacity needs a point foot x, y, z"
         )
-    n = len(mechanism.joints)
     limits = as_array("effort_limits", effort_limits, n, 2)
-    on_ground = Contact(
+    try:
+        verdict, numbers = _footholds(
+            limits, jacobian, angular_jacobian, posture.status, _rows(contact, n)
+        )
+    except ValueError:
+        shapes = {"candidates": np.shape(posture.status), **_leading_shapes(_arrays(contact, n))}
+        raise broadcast_error(shapes) from None
+    verdicts = verdict.tobytes()  # searched within less than a microsecond
+    if not verdicts or WRONG_CONTACT in verdicts:
+        check_effort_limits(limits[:, 0], limits[:, 1])
+        _check_contact(_arrays(contact, n))
+    return Footholds(verdict, posture, numbers)
+
+
+def _rows(contact: Contact, n: int) -> FloatArray:
+    """Return all that a contact says of a point in one row (..., 9 + n)."""
+    try:
+        return _known_row(contact, n)
+    except TypeError:  # arrays have no hash
+        return _joined(_arrays(contact, n), n)
+
+
+@lru_cache
+def _known_row(contact: Contact, n: int) -> FloatArray:
+    """Return the row of a contact that cannot change, kept for the next call."""
+    row = _joined(_arrays(contact, n), n)
+    row.flags.writeable = False
+    return row
+
+
+def _arrays(contact: Contact, n: int) -> Contact:
+    """Return a contact whose fields are arrays."""
+    return Contact(
         as_array("friction", contact.friction),
         as_array("normal", contact.normal, 3),
         as_array("load", contact.load),
@@ -182,26 +273,31 @@ def judge_footholds(
         as_array("any_moment", contact.any_moment),
         as_vectors("bias", contact.bias, n),
     )
-    try:
-        verdict, *values = _footholds(
-            limits,
-            kinematics.jacobian,
-            kinematics.angular_jacobian,
-            posture.status,
-            *on_ground,
-        )
-    except ValueError:
-        shapes = {"candidates": np.shape(posture.status)}
-        for name in ("friction", "load", "any_moment"):
-            shapes[name] = getattr(on_ground, name).shape
-        for name in ("normal", "moment", "bias"):
-            shapes[name] = getattr(on_ground, name).shape[:-1]
-        raise broadcast_error(shapes) from None
-    verdicts = verdict.tobytes()  # searched within less than a microsecond
-    if not verdicts or WRONG_CONTACT in verdicts:
-        check_effort_limits(limits[:, 0], limits[:, 1])
-        _check_contact(on_ground)
-    return Footholds(verdict, posture, *values)
+
+
+def _leading_shapes(contact: Any) -> dict[str, tuple[int, ...]]:
+    """Return the leading axes of the fields, by name, of a contact of arrays."""
+    return {
+        "friction": contact.friction.shape,
+        "normal": contact.normal.shape[:-1],
+        "load": contact.load.shape,
+        "moment": contact.moment.shape[:-1],
+        "any_moment": contact.any_moment.shape,
+        "bias": contact.bias.shape[:-1],
+    }
+
+
+def _joined(contact: Contact, n: int) -> FloatArray:
+    """Return the fields of a contact of arrays beside each other."""
+    batch = common_batch(_leading_shapes(contact).values())
+    row = np.empty((OF_CONTACT + n, *batch[::-1])).T  # each field in one piece of memory
+    row[..., MU] = contact.friction
+    row[..., NORMAL:LOAD] = contact.normal
+    row[..., LOAD] = contact.load
+    row[..., MOMENT:ANY_MOMENT] = contact.moment
+    row[..., ANY_MOMENT] = contact.any_moment
+    row[..., OF_CONTACT:] = contact.bias
+    return row
 
 
 def _check_contact(contact: Contact) -> None:
@@ -220,22 +316,23 @@ def _check_contact(contact: Contact) -> None:
 
 # --------------------------------------------------------------------------- kernel
 
-# Rows of a block: what is given,
-STATUS, MU, NORMAL, LOAD, MOMENT, ANY_MOMENT = 0, 1, 2, 5, 6, 9
-# what is found on the way,
-VALID, HOLDS, CERTAIN, ROUGH = 10, 11, 12, 13
-# the results,
-VERDICT, CAPACITY, MU_E, MU_FULL, FORCE, SHARE, JOINT, OF_POINT = 14, 15, 16, 17, 18, 21, 22, 23
-# then what n joints have, each row n times: columns of both Jacobians (3 n), limits, bias; the
-# reserve, what it leaves of the limits, and the efforts.
-J, OMEGA = 0, 3
-LOWER, UPPER, BIAS, RESERVE, LEAST, MOST, TAU, OF_JOINTS = range(6, 14)
+# Rows of a block: what the contact says, as in its row,
+MU, NORMAL, LOAD, MOMENT, ANY_MOMENT, OF_CONTACT = 0, 1, 4, 5, 8, 9
+# what else is given or found on the way, and the verdict,
+STATUS, VALID, HOLDS, CERTAIN, ROUGH, VERDICT = 9, 10, 11, 12, 13, 14
+# the numbers of `Footholds`,
+CAPACITY, MU_E, MU_FULL, MARGIN, SHARE, JOINT, FORCE, OF_POINT = 15, 16, 17, 18, 19, 20, 21, 24
+NUMBERS = CAPACITY
+# then what n joints have, each row n times: the efforts, which are the last of those numbers;
+# limits, bias, the reserve and what it leaves of the limits; columns of both Jacobians (3 n).
+TAU, LOWER, UPPER, BIAS, RESERVE, LEAST, MOST = range(7)
+J, OMEGA, OF_JOINTS = 7, 10, 13
 
 
 @inlined
 def row_of(joint_row, n, joint):
     """Return the row of a number of a joint."""
-    width = 3 if joint_row < LOWER else 1
+    width = 3 if joint_row >= J else 1
     return OF_POINT + joint_row * n + width * joint
 
 
@@ -324,6 +421,7 @@ def judge(block, i, n):
     block[JOINT, i] = worst if solved else -1.0
     block[MU_E, i] = block[MU_E, i] if solved else math.nan
     block[MU_FULL, i] = block[MU_FULL, i] if solved else math.nan
+    block[MARGIN, i] = block[MU, i] - block[MU_E, i]
 
 
 @inlined
@@ -343,34 +441,15 @@ def share_of_limits(effort, reserve, least, most):
 
 
 @kernel(
-    "(n,k),(points,d,n),(points,d,n),(points),(points),(points,d),(points),(points,d),(points),"
-    "(points,n)->(points),(points),(points),(points),(points),(points,d),(points,n),(points),"
-    "(points)",
-    "f8[:,:], f8[:,:,:], f8[:,:,:], u1[:], f8[:], f8[:,:], f8[:], f8[:,:], f8[:], f8[:,:],"
-    "u1[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], i4[:]",
+    "(n,k),(points,d,n),(points,d,n),(points),(points,w)->(points),(points,w)",
+    "f8[:,:], f8[:,:,:], f8[:,:,:], u1[:], f8[:,:], u1[:], f8[:,:]",
 )
-def _footholds(
-    limits,
-    jacobian,
-    angular,
-    status,
-    friction,
-    normal,
-    load_,
-    moment,
-    any_moment,
-    bias,
-    verdict,
-    capacity,
-    mu_e,
-    mu_full,
-    margin,
-    force,
-    efforts,
-    share,
-    joint,
-):
-    """Judge points in blocks; with three actuators the number is a constant for the compiler."""
+def _footholds(limits, jacobian, angular, status, contact, verdict, numbers):
+    """Judge points in blocks; with three actuators the number is a constant for the compiler.
+
+    What a contact says and what is found of it stand in one row each, because every array costs a
+    call as much as some points do. Both rows are 9 + n long.
+    """
     n = len(limits)
     block = np.empty((OF_POINT + OF_JOINTS * n, BLOCK))
     for i in range(min(BLOCK, len(status))):
@@ -382,30 +461,22 @@ def _footholds(
     for start in range(0, len(status), BLOCK):
         end = min(start + BLOCK, len(status))
         load_numbers(block, STATUS, status, start, end)
-        load_numbers(block, MU, friction, start, end)
-        load(block, NORMAL, normal, start, end, 3)
-        load_numbers(block, LOAD, load_, start, end)
-        load(block, MOMENT, moment, start, end, 3)
-        load_numbers(block, ANY_MOMENT, any_moment, start, end)
         if n == 3:
-            judge_block(block, jacobian, angular, bias, force, efforts, start, end, 3)
+            judge_block(block, jacobian, angular, contact, numbers, start, end, 3)
         else:
-            judge_block(block, jacobian, angular, bias, force, efforts, start, end, n)
+            judge_block(block, jacobian, angular, contact, numbers, start, end, n)
         for i in range(end - start):
-            k = start + i
-            verdict[k], joint[k] = int(block[VERDICT, i]), int(block[JOINT, i])
-            capacity[k], share[k] = block[CAPACITY, i], block[SHARE, i]
-            mu_e[k], mu_full[k] = block[MU_E, i], block[MU_FULL, i]
-            margin[k] = block[MU, i] - block[MU_E, i]
+            verdict[start + i] = int(block[VERDICT, i])
     ignore_float_errors()
 
 
 @inlined
-def judge_block(block, jacobian, angular, bias, force, efforts, start, end, n):
-    """Judge points start to end, whose contacts are in the block."""
+def judge_block(block, jacobian, angular, contact, numbers, start, end, n):
+    """Judge points start to end, whose status is in the block."""
+    load(block, MU, contact, start, end, OF_CONTACT)
+    load(block, row_of(BIAS, n, 0), contact[:, OF_CONTACT:], start, end, n)
     load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
     load_columns(block, row_of(OMEGA, n, 0), angular, start, end, n)
-    load(block, row_of(BIAS, n, 0), bias, start, end, n)
     for i in range(end - start):
         prepare(block, i, n)
     if n == 3:
@@ -416,8 +487,7 @@ def judge_block(block, jacobian, angular, bias, force, efforts, start, end, n):
             solve_any(block, i, n, jacobian[start + i])
     for i in range(end - start):
         judge(block, i, n)
-    store(block, FORCE, force, start, end, 3)
-    store(block, row_of(TAU, n, 0), efforts, start, end, n)
+    store(block, NUMBERS, numbers, start, end, OF_POINT - NUMBERS + n)
 
 
 @scalar

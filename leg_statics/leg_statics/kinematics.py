@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
+from leg_kinematics.mechanism import Mechanism, Posture
 
 
 class Kinematics:
@@ -20,14 +20,6 @@ class Kinematics:
     def __init__(self, mechanism: Mechanism, posture: Posture) -> None:
         self.mechanism: Any = mechanism  # some Jacobians exist for some mechanisms only
         self.posture = posture
-
-    @classmethod
-    def of_feet(cls, mechanism: Mechanism, foot_positions: FloatArray) -> Kinematics:
-        """Solve for foot positions (..., t), with both Jacobians in the same pass."""
-        posture, jacobian, angular = inverse_with_jacobians(mechanism, foot_positions)
-        kinematics = cls(mechanism, posture)
-        kinematics.jacobian, kinematics.angular_jacobian = jacobian, angular
-        return kinematics
 
     @cached_property
     def jacobian(self) -> FloatArray:

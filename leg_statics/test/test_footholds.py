@@ -190,6 +190,30 @@ def test_contacts_may_differ_from_candidate_to_candidate():
         np.testing.assert_array_equal(one.load_capacity, together.load_capacity[k])
 
 
+def test_a_contact_whose_array_changed_is_read_anew():
+    load, points = np.array(10.0), CANDIDATES[:50]
+    contact = Contact(0.4, load=load)
+    evaluate_footholds(LEG, LIMITS, points, contact)
+    load[()] = 500.0
+    again = evaluate_footholds(LEG, LIMITS, points, contact)
+    np.testing.assert_array_equal(
+        again.verdict, evaluate_footholds(LEG, LIMITS, points, Contact(0.4, load=500.0)).verdict
+    )
+
+
+def test_numbers_have_a_column_for_each_result():
+    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["soft"])
+    results = [
+        *(footholds.load_capacity, footholds.rated_friction, footholds.rated_friction_full),
+        *(footholds.friction_margin, footholds.utilisation, footholds.limiting_joint),
+    ]
+    columns = np.column_stack([*results, footholds.force, footholds.efforts])
+    np.testing.assert_array_equal(footholds.numbers, columns)
+    one = evaluate_footholds(LEG, LIMITS, CANDIDATES[0], CONTACTS["soft"])
+    assert isinstance(one.load_capacity, float)
+    assert one.limiting_joint.dtype == np.int32
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [

@@ -84,9 +84,6 @@ class Geometry(NamedTuple):
     phi3: float
 
 
-GEOMETRY_SIZE = len(Geometry._fields)
-
-
 class Branch(NamedTuple):
     """Signs that tell the solutions of the loop equations apart; each is +1 or -1.
 
@@ -102,6 +99,9 @@ class Branch(NamedTuple):
     center: float
     knee: float
     loop: float
+
+
+GEOMETRY_SIZE, BRANCH_SIZE = len(Geometry._fields), len(Branch._fields)
 
 
 class Pose(NamedTuple):
@@ -572,6 +572,9 @@ def jacobian_columns(
 
 # The inverse runs over blocks of points, with these rows:
 X, Q, CLOSURE, STATUS, J, OMEGA, ROWS = 0, 3, 6, 11, 12, 21, 30
+# An array of results costs a call as much as several points do. Joint positions and closure
+# therefore share one, as do both Jacobians. Arguments that set lengths of results:
+COORDINATES, TWIST, CLOSURE_SHAPE = np.empty(8), np.empty(6), np.empty(5)
 
 
 @inlined
@@ -595,54 +598,55 @@ def solve_foot(
     return pose
 
 
-@kernel(
-    "(g),(b),(r),(l),(c),(points,n)->(points,n),(points,c),(points)",
-    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:,:], u1[:]",
-)
-def _inverse(geometry, signs, rest, limits, shape, foot, q, closure, status):
-    """Foot positions in {C} to crank angles and closure; `shape` sets the closure's length."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
-    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+@inlined
+def unpacked(parameters: FloatArray) -> tuple[Geometry, Branch, Numbers, Numbers]:
+    """Return dimensions, branch, rest and limits, which `ParallelDrive._parameters` joins."""
+    end = GEOMETRY_SIZE + BRANCH_SIZE + REST_SIZE
+    return (
+        Geometry(*to_fixed_tuple(parameters, GEOMETRY_SIZE)),
+        Branch(*to_fixed_tuple(parameters[GEOMETRY_SIZE:], BRANCH_SIZE)),
+        to_fixed_tuple(parameters[GEOMETRY_SIZE + BRANCH_SIZE :], REST_SIZE),
+        to_fixed_tuple(parameters[end:], LIMITS_SIZE),
+    )
+
+
+@kernel("(p),(c),(points,n)->(points,c),(points)", "f8[:], f8[:], f8[:,:], f8[:,:], u1[:]")
+def _inverse(parameters, shape, foot, coordinates, status):
+    """Foot positions in {C} to crank angles and closure."""
+    g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
     for start in range(0, len(foot), BLOCK):
         end = min(start + BLOCK, len(foot))
         load(block, X, foot, start, end, 3)
         for i in range(end - start):
-            solve_foot(g, branch, at_rest, bounds, block, i)
-        store(block, Q, q, start, end, 3)
-        store(block, CLOSURE, closure, start, end, 5)
+            solve_foot(g, branch, rest, limits, block, i)
+        store(block, Q, coordinates, start, end, 8)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
     ignore_float_errors()
 
 
 @kernel(
-    "(g),(b),(r),(l),(c),(points,n)->(points,n),(points,c),(points),(points,n,n),(points,n,n)",
-    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:,:], u1[:], f8[:,:,:], f8[:,:,:]",
+    "(p),(c),(t),(points,n)->(points,c),(points),(points,t,n)",
+    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], u1[:], f8[:,:,:]",
 )
-def _inverse_with_jacobians(
-    geometry, signs, rest, limits, shape, foot, q, closure, status, jacobian, angular
-):
-    """`_inverse` and both Jacobians of the solved pose in one pass."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
-    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
+def _inverse_with_jacobians(parameters, shape, twist_shape, foot, coordinates, status, jacobians):
+    """`_inverse` and, below each other, both Jacobians of the solved pose in one pass."""
+    g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
     for start in range(0, len(foot), BLOCK):
         end = min(start + BLOCK, len(foot))
         load(block, X, foot, start, end, 3)
         for i in range(end - start):
-            pose = solve_foot(g, branch, at_rest, bounds, block, i)
+            pose = solve_foot(g, branch, rest, limits, block, i)
             f1, f2 = gradients(g, pose)
             for crank in range(3):
                 v, omega = jacobian_columns(g, pose, f1, f2, crank)
                 put(block, J + 3 * crank, i, v)
                 put(block, OMEGA + 3 * crank, i, omega)
-        store(block, Q, q, start, end, 3)
-        store(block, CLOSURE, closure, start, end, 5)
-        store_columns(block, J, jacobian, start, end, 3)
-        store_columns(block, OMEGA, angular, start, end, 3)
+        store(block, Q, coordinates, start, end, 8)
+        store_columns(block, J, jacobians[:, :3], start, end, 3)
+        store_columns(block, OMEGA, jacobians[:, 3:], start, end, 3)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
     ignore_float_errors()
@@ -685,30 +689,21 @@ def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArr
             jacobian[k, crank], angular[k, crank] = v[k], omega[k]
 
 
-@kernel(
-    "(g),(b),(r),(l),(n),(c)->(n),(c),()",
-    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]",
-)
-def _forward(geometry, signs, rest, limits, q, shape, foot, closure, status):
+@kernel("(p),(n),(c)->(n),(c),()", "f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]")
+def _forward(parameters, q, shape, foot, closure, status):
     """Crank angles to foot position in {C} and closure."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
-    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
-    status[0] = solve_cranks(g, branch, at_rest, bounds, q, foot, closure)
+    g, branch, rest, limits = unpacked(parameters)
+    status[0] = solve_cranks(g, branch, rest, limits, q, foot, closure)
 
 
 @kernel(
-    "(g),(b),(r),(l),(n),(c)->(n),(c),(),(n,n),(n,n)",
-    "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
+    "(p),(n),(c)->(n),(c),(),(n,n),(n,n)",
+    "f8[:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
 )
-def _forward_with_jacobians(
-    geometry, signs, rest, limits, q, shape, foot, closure, status, jacobian, angular
-):
+def _forward_with_jacobians(parameters, q, shape, foot, closure, status, jacobian, angular):
     """`_forward` and both Jacobians of the solved pose in one pass."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
-    at_rest, bounds = to_fixed_tuple(rest, REST_SIZE), to_fixed_tuple(limits, LIMITS_SIZE)
-    status[0] = solve_cranks(g, branch, at_rest, bounds, q, foot, closure)
+    g, branch, rest, limits = unpacked(parameters)
+    status[0] = solve_cranks(g, branch, rest, limits, q, foot, closure)
     fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
 
 
@@ -894,17 +889,15 @@ class ParallelDrive(Dimensioned):
         return self._initial[1] * [crank_1, crank_2, center, knee, center]
 
     @cached_property
-    def _known_parameters(self) -> dict[str, tuple[FloatArray, ...]]:
+    def _known_parameters(self) -> dict[str, FloatArray]:
         return {}
 
-    def _parameters(self, assembly_mode: str) -> tuple[FloatArray, ...]:
-        """Return the arguments that the kernels share, kept for the next call."""
+    def _parameters(self, assembly_mode: str) -> FloatArray:
+        """Return all that the kernels know of the leg in one array, kept for the next call."""
         if assembly_mode not in self._known_parameters:
-            self._known_parameters[assembly_mode] = (
-                self._geometry,
-                self._branch(assembly_mode),
-                self._rest,
-                np.concatenate([self.joint_limits, self._passive_bounds]).ravel(),
+            limits = np.concatenate([self.joint_limits, self._passive_bounds])
+            self._known_parameters[assembly_mode] = np.concatenate(
+                [self._geometry, self._branch(assembly_mode), self._rest, limits.ravel()]
             )
         return self._known_parameters[assembly_mode]
 
@@ -925,7 +918,7 @@ class ParallelDrive(Dimensioned):
             the mode's solution is unique; beyond the drive's singularity the status is SINGULAR.
         """
         q = as_array("joint_positions", joint_positions, 3)
-        foot, closure, status = _forward(*self._parameters(assembly_mode), q, np.zeros(5))
+        foot, closure, status = _forward(self._parameters(assembly_mode), q, CLOSURE_SHAPE)
         return Posture(q, closure, foot, status)
 
     def forward_with_jacobians(
@@ -934,7 +927,7 @@ class ParallelDrive(Dimensioned):
         """`forward`, `jacobian` and `angular_jacobian` in one pass."""
         q = as_array("joint_positions", joint_positions, 3)
         foot, closure, status, jacobian, angular = _forward_with_jacobians(
-            *self._parameters(assembly_mode), q, np.zeros(5)
+            self._parameters(assembly_mode), q, CLOSURE_SHAPE
         )
         return Posture(q, closure, foot, status), jacobian, angular
 
@@ -949,18 +942,19 @@ class ParallelDrive(Dimensioned):
             The posture; NaN where the foot is out of reach.
         """
         foot = as_array("foot_position", foot_position, 3)
-        q, closure, status = _inverse(*self._parameters(assembly_mode), np.zeros(5), foot)
-        return Posture(q, closure, foot, status)
+        coordinates, status = _inverse(self._parameters(assembly_mode), COORDINATES, foot)
+        return Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
 
     def inverse_with_jacobians(
         self, foot_position: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray, FloatArray]:
         """`inverse`, `jacobian` and `angular_jacobian` in one pass, for half the price."""
         foot = as_array("foot_position", foot_position, 3)
-        q, closure, status, jacobian, angular = _inverse_with_jacobians(
-            *self._parameters(assembly_mode), np.zeros(5), foot
+        coordinates, status, jacobians = _inverse_with_jacobians(
+            self._parameters(assembly_mode), COORDINATES, TWIST, foot
         )
-        return Posture(q, closure, foot, status), jacobian, angular
+        posture = Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
+        return posture, jacobians[..., :3, :], jacobians[..., 3:, :]
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of the foot's velocity, v = J q' (..., 3, 3) [m/rad]; equation (1)."""
