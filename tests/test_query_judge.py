@@ -139,7 +139,8 @@ def test_answers_are_those_of_the_node_bit_for_bit(recorded):
         *("UNKNOWN_LEG", "UNKNOWN_GROUND", "TOO_LARGE")
     ]
     assert len(planned) == 12
-    assert judge.unanswered == judge.without_request == 0
+    assert judge.unanswered == 0
+    assert judge.without_request <= 1  # the recorder may have come between question and answer
     assert judge.without_contents == 1
     assert not any(query.legs == "right_middle" for query in found)
     assert all(0.0 < query.seconds < 10.0 for query in found)
