@@ -250,6 +250,16 @@ def test_a_topic_of_another_type_is_told(recorded, tmp_path):
         QueryJudge(Bag(tmp_path / "bag"), load_grounds("grounds"), NODE)
 
 
+def test_events_of_another_version_are_told(recorded, tmp_path):
+    bag = Bag(recorded[0])
+    older = bag.topics[FOOTHOLDS].definition.data.replace("int32 best ", "int64 best ")
+    definition = bag.topics[FOOTHOLDS].definition._replace(data=older)
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.copy_topic(bag.topics[FOOTHOLDS]._replace(definition=definition), bag.types)
+    with pytest.raises(ValueRangeError, match=r"another version of leg_msgs"):
+        QueryJudge(Bag(tmp_path / "bag"), load_grounds("grounds"), NODE)
+
+
 def test_an_event_that_is_cut_off_is_refused_and_the_others_judged(recorded, tmp_path):
     bag = Bag(recorded[0])
     with BagWriter(tmp_path / "bag") as writer:

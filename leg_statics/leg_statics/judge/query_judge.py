@@ -20,6 +20,7 @@ from leg_msgs.srv import QueryFootholds, QueryStepLength
 from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.bags import Bag, BagMessage
 from leg_msgs_py.comparison import Difference, Tolerance, differences
+from leg_msgs_py.definitions import message_definition
 
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.requests import error_code
@@ -31,7 +32,7 @@ from leg_statics.judge.findings import Envelope
 from leg_statics.step_requests import fill_step_length
 
 REQUEST_RECEIVED, RESPONSE_SENT = 1, 2  # of service_msgs/ServiceEventInfo, told by the node
-MOST_WAITING = 1000  # requests without a response yet
+MOST_WAITING = 256  # requests without a response yet; the node queues no more
 MOST_QUERIES = 4096  # that wait to be taken
 MOST_TALLIES = 100  # requests may name anything as legs
 OTHERS = "others"
@@ -105,7 +106,7 @@ class QueryJudge:
         without_request: Responses whose request was not recorded.
 
     Raises:
-        ValueRangeError: If a topic has another type of messages.
+        ValueRangeError: If a topic has another type of messages, or one of another version.
     """
 
     def __init__(self, bag: Bag, grounds: Grounds, node: str = "/statics") -> None:
@@ -115,6 +116,12 @@ class QueryJudge:
             if bag.topics[topic].type != service.event_type:
                 raise ValueRangeError(
                     f"topic {topic}: got {bag.topics[topic].type}; allowed: {service.event_type}"
+                )
+            installed = message_definition(service.event_type).hash
+            if bag.types.hash_rihs01(service.event_type) != installed:
+                raise ValueRangeError(
+                    f"topic {topic}: {service.event_type} is not defined there as it is installed "
+                    "here: another version of leg_msgs"
                 )
         self.inputs = set(self._services)
         self.services = [service.name for service in self._services.values()]
