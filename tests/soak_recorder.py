@@ -1,7 +1,7 @@
 """A minute at 1 kHz for six legs, without a message lost: `make soak`.
 
-Too long for the tests, which do the same for a few seconds. The machine should do nothing else:
-where processes wait a quarter of a second for a processor, the middleware's queues overflow.
+Too long for the tests, which check that what is lost is counted. The machine should do nothing
+else: where the recorder waits for a processor for some 85 ms, the middleware's queue overflows.
 """
 
 import json

@@ -159,6 +159,21 @@ def test_memory_does_not_grow_with_the_recording(tmp_path):
     assert peak(tmp_path / "long", 400) < 1.2 * peak(tmp_path / "short", 80)
 
 
+def test_a_definition_of_another_kind_does_not_hide_the_recording(tmp_path):
+    source = Bag(TRIPOD)
+    strange = f"{'=' * 80}\nACTION: leg_msgs/action/SearchGeometry\nfloat64 x\n---\n---\n"
+    topic = source.topics["/joint_states"]
+    topic = topic._replace(definition=topic.definition._replace(data=strange))
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.copy_topic(topic, source.types)
+        for message in source.messages(["/joint_states"]):
+            writer.write(message.topic, message.time, message.data)
+    bag = Bag(tmp_path / "bag")
+    assert bag.topics["/joint_states"].definition.data == strange
+    assert bag.types.hash_rihs01(JOINT_STATE) == message_definition(JOINT_STATE).hash
+    assert all(len(bag.decode(message).name) == 18 for message in bag.messages())
+
+
 def test_types_without_a_definition_are_the_installed_ones(tmp_path):
     path = rewritten(tmp_path / "bag", definitions=False)
     bag = Bag(path)

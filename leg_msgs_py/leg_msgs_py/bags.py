@@ -358,8 +358,11 @@ def _bag_types(topics: Collection[Topic]) -> Typestore:
     """
     types = get_typestore(Stores.EMPTY)
     for topic in topics:
+        defined = {}
+        with suppress(TypesysError):  # what one topic says in another way shall not hide the others
+            defined = _defined_types(topic)
         try:
-            types.register(_defined_types(topic))
+            types.register(defined)
         except TypesysError as error:
             raise BagError(f"{topic.name}: {error}") from None
     for topic in topics:

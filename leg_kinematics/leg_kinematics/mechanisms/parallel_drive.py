@@ -572,8 +572,8 @@ def jacobian_columns(
 
 # The inverse runs over blocks of points, with these rows:
 X, Q, CLOSURE, STATUS, J, OMEGA, ROWS = 0, 3, 6, 11, 12, 21, 30
-# An array of results costs a call as much as several points do. Joint positions and closure
-# therefore share one, as do both Jacobians. Arguments that set lengths of results:
+# An array of results costs a call as much as several points do. Joint positions and closure, whose
+# rows follow each other, therefore share one, as do both Jacobians. Arguments that set the lengths:
 COORDINATES, TWIST, CLOSURE_SHAPE = np.empty(8), np.empty(6), np.empty(5)
 
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,10 +50,10 @@ class Summary(NamedTuple):
         verdicts: How many footholds have which verdict.
     """
 
-    points: int = 0
-    feasible: int = 0
-    best: float = np.nan
-    verdicts: Mapping[Verdict, int] = MappingProxyType({})
+    points: int
+    feasible: int
+    best: float
+    verdicts: Counter[Verdict]
 
 
 class Query(NamedTuple):
@@ -269,7 +268,8 @@ class _Service(NamedTuple):
 
 
 def _foothold_summary(response: Any) -> Summary:
-    verdicts = Counter(map(Verdict, response.verdict))
+    numbers, counts = np.unique(from_field(response.verdict, dtype=np.uint8), return_counts=True)
+    verdicts = Counter(dict(zip(map(Verdict, numbers), counts.tolist(), strict=True)))
     best = response.load_capacity[response.best] if response.ranking else np.nan
     return Summary(len(response.verdict), verdicts[Verdict.FEASIBLE], best, verdicts)
 
@@ -277,7 +277,7 @@ def _foothold_summary(response: Any) -> Summary:
 def _step_summary(response: Any) -> Summary:
     lengths, common = from_field(response.lengths), from_field(response.common_lengths)
     best = float(np.max(common)) if common.size else np.nan
-    return Summary(len(lengths), int(np.sum(lengths > 0.0)), best)
+    return Summary(len(lengths), int(np.sum(lengths > 0.0)), best, Counter())
 
 
 SERVICES = (

@@ -266,7 +266,8 @@ def _moments(case: Case, clock: _Clock) -> list[str]:
 def _queries(case: Case, clock: _Clock) -> list[str]:
     judge, findings = case.queries, case.query_findings
     if not judge.inputs:
-        return ["None were recorded: the node's parameter service_events was not 'contents'."]
+        node = case.judge.topics.node
+        return [f"None of {node} were recorded; its parameter service_events makes it tell them."]
     heads = ("service", "legs", "queries", "refused", "points", "feasible", "best", "time [ms]")
     services = [
         (

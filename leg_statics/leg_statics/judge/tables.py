@@ -157,7 +157,7 @@ class QueryTable:
             {
                 **query._asdict(),
                 **query.answer._asdict(),
-                **{each.name.lower(): query.answer.verdicts.get(each, 0) for each in Verdict},
+                **{each.name.lower(): query.answer.verdicts[each] for each in Verdict},
                 "feasible": query.answer.feasible,
                 "difference": query.difference.field if query.difference else "",
             }
