@@ -87,6 +87,11 @@ def common_batch(shapes: Iterable[tuple[int, ...]]) -> tuple[int, ...]:
     return different.pop() if different else ()
 
 
+def has_code(codes: Any, code: int) -> bool:
+    """Tell whether a code is among those of points (...); `np.any` takes ten times as long."""
+    return code in codes.tobytes() if codes.ndim else bool(codes == code)
+
+
 def broadcast_error(shapes: Mapping[str, tuple[int, ...]]) -> ShapeError:
     """Return the error that tells which leading shapes do not broadcast, by argument name."""
     batch: tuple[int, ...] = ()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import leg_kinematics
-from leg_kinematics.kernel import ignore_float_errors, kernel, scalar
+from leg_kinematics.kernel import kernel, scalar
 
 PACKAGES = str(Path(leg_kinematics.__file__).parents[1])
 
@@ -97,55 +97,3 @@ def test_an_unwritable_cache_falls_back_to_none(program, tmp_path):
     result = run(program, blocked)
     assert result.stdout == "6.0\n"
     assert "no writable cache folder" in result.stderr
-
-
-@kernel("(n),(points,n),(points)->(points),(points,n)", "f8[:], f8[:,:], f8[:], f8[:], f8[:,:]")
-def project(axis, points, factor, along, rest):
-    for i in range(len(points)):
-        along[i] = 0.0
-        for k in range(len(axis)):
-            along[i] += factor[i] * axis[k] * points[i, k]
-        for k in range(len(axis)):
-            rest[i, k] = points[i, k] - along[i] * axis[k]
-    ignore_float_errors()
-
-
-@pytest.mark.parametrize(
-    ("points", "factor", "batch"),
-    [
-        ((), (), ()),
-        ((5,), (), (5,)),
-        ((), (5,), (5,)),
-        ((2, 3), (), (2, 3)),
-        ((2, 1), (3,), (2, 3)),
-        ((3,), (2, 1), (2, 3)),
-        ((0,), (), (0,)),
-        ((0, 4), (4,), (0, 4)),
-    ],
-)
-def test_a_kernel_over_points_takes_and_gives_back_any_leading_axes(points, factor, batch):
-    random = np.random.default_rng(0)
-    axis = np.array([0.0, 0.6, 0.8])
-    p, f = random.normal(size=(*points, 3)), random.normal(size=factor)
-    along, rest = project(axis, p, f)
-    assert np.shape(along) == batch
-    assert np.shape(rest) == (*batch, 3)
-    np.testing.assert_allclose(along, f * (p @ axis), atol=1e-15)
-    np.testing.assert_allclose(rest, p - along[..., None] * axis, atol=1e-15)
-
-
-def test_points_that_do_not_broadcast_are_refused():
-    with pytest.raises(ValueError, match="broadcast"):
-        project(np.ones(3), np.ones((2, 3)), np.ones(3))
-
-
-@pytest.mark.filterwarnings("error")
-def test_points_without_an_answer_do_not_warn():
-    along, _ = project(np.ones(3), np.full((3, 3), np.inf), np.zeros(3))
-    assert np.isnan(along).all()
-
-
-def test_points_that_are_no_row_of_memory_are_read_as_they_are():
-    points = np.arange(24.0).reshape(3, 8).T  # strided
-    along, _ = project(np.array([0.0, 0.0, 1.0]), points[::2], np.array(1.0))
-    np.testing.assert_array_equal(along, points[::2, 2])

@@ -33,11 +33,14 @@ from leg_kinematics.arrays import (
     as_non_negative,
     as_vectors,
     broadcast_error,
+    has_code,
 )
 from leg_kinematics.blocks import BLOCK, get3, load, load_columns, load_numbers, put
 from leg_kinematics.errors import ShapeError, ValueRangeError
-from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
-from leg_statics.plane_capacity import BOUNDED, CapacityStatus, plane_capacity
+from leg_kinematics.kernel import inlined, scalar
+from leg_kinematics.points_kernel import points_kernel
+from leg_statics.plane_capacity import BOUNDED, INVALID_INPUT, plane_capacity
+from leg_statics.plane_capacity import CapacityStatus as CapacityStatus
 from leg_statics.three_joint_capacity import three_joint_capacity
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -107,8 +110,7 @@ def load_capacity(
         others = {"effort_lower": lower, "effort_upper": upper, "bias": idle, "normal": direction}
         shapes |= {name: array.shape[:-1] for name, array in others.items()}
         raise broadcast_error(shapes) from None
-    status = result.status.tobytes()  # searched within less than a microsecond
-    if not status or CapacityStatus.INVALID_INPUT in status:
+    if not result.status.size or has_code(result.status, INVALID_INPUT):
         check_effort_limits(lower, upper)
         as_non_negative("friction", mu)
         check_normals("normal", direction)
@@ -191,9 +193,9 @@ def capacity_of_point(
     return plane_capacity(jacobian, lower, upper, bias, friction, n)[0]
 
 
-@kernel(
-    "(points,d,n),(points,n),(points,n),(points,n),(points),(points,d)->(points),(points,d),(points),(points),(points)",
-    "f8[:,:,:], f8[:,:], f8[:,:], f8[:,:], f8[:], f8[:,:], f8[:], f8[:,:], i8[:], b1[:], u1[:]",
+@points_kernel(
+    "(points,3,n),(points,n),(points,n),(points,n),(points),(points,3)->(points),(points,3),(points),(points),(points)",
+    "f8 f8 f8 f8 f8 f8 f8 f8 i8 b1 u1",
 )
 def _load_capacity(
     jacobian: Any,
@@ -249,4 +251,3 @@ def _load_capacity(
                     friction_limited[k],
                     status[k],
                 ) = plane_capacity(jacobian[k], lower[k], upper[k], bias[k], friction[k], n)
-    ignore_float_errors()

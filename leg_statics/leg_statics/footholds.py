@@ -18,6 +18,7 @@ from leg_kinematics.arrays import (
     as_vectors,
     broadcast_error,
     common_batch,
+    has_code,
 )
 from leg_kinematics.blocks import (
     BLOCK,
@@ -29,8 +30,9 @@ from leg_kinematics.blocks import (
     store,
 )
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
-from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
+from leg_kinematics.kernel import inlined, scalar
 from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
+from leg_kinematics.points_kernel import points_kernel
 from leg_kinematics.status import Status
 from leg_statics.capacity import check_effort_limits, check_normals, difference, unit
 from leg_statics.efforts import worst_moment_effort
@@ -181,7 +183,7 @@ class Footholds(NamedTuple):
 
 
 def evaluate_footholds(
-    mechanism: Mechanism, effort_limits: ArrayLike, foot_positions: ArrayLike, contact: Contact
+    mechanism: Mechanism, effort_limits: ArrayLike, foot_position: ArrayLike, contact: Contact
 ) -> Footholds:
     """Evaluate foothold candidates.
 
@@ -191,7 +193,7 @@ def evaluate_footholds(
     Args:
         mechanism: The leg's mechanism; its foot must be a point in space.
         effort_limits: Lower (≤ 0) and upper (≥ 0) effort of each actuator (n, 2) [N.m or N].
-        foot_positions: Candidates in the leg frame (..., 3) [m].
+        foot_position: Candidates in the leg frame (..., 3) [m].
         contact: Ground, required load and moment.
 
     Raises:
@@ -199,8 +201,7 @@ def evaluate_footholds(
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
-    foot = as_array("foot_positions", foot_positions, len(mechanism.task_coordinates))
-    posture, jacobian, angular = inverse_with_jacobians(mechanism, foot)
+    posture, jacobian, angular = inverse_with_jacobians(mechanism, foot_position)
     return _judged(mechanism, posture, jacobian, angular, effort_limits, contact)
 
 
@@ -240,8 +241,7 @@ def _judged(
     except ValueError:
         shapes = {"candidates": np.shape(posture.status), **_leading_shapes(_arrays(contact, n))}
         raise broadcast_error(shapes) from None
-    verdicts = verdict.tobytes()  # searched within less than a microsecond
-    if not verdicts or WRONG_CONTACT in verdicts:
+    if not verdict.size or has_code(verdict, WRONG_CONTACT):
         check_effort_limits(limits[:, 0], limits[:, 1])
         _check_contact(_arrays(contact, n))
     return Footholds(verdict, posture, numbers)
@@ -258,9 +258,7 @@ def _rows(contact: Contact, n: int) -> FloatArray:
 @lru_cache
 def _known_row(contact: Contact, n: int) -> FloatArray:
     """Return the row of a contact that cannot change, kept for the next call."""
-    row = _joined(_arrays(contact, n), n)
-    row.flags.writeable = False
-    return row
+    return _joined(_arrays(contact, n), n)
 
 
 def _arrays(contact: Contact, n: int) -> Contact:
@@ -440,9 +438,9 @@ def share_of_limits(effort, reserve, least, most):
     return below if below > above else above
 
 
-@kernel(
-    "(n,k),(points,d,n),(points,d,n),(points),(points,w)->(points),(points,w)",
-    "f8[:,:], f8[:,:,:], f8[:,:,:], u1[:], f8[:,:], u1[:], f8[:,:]",
+@points_kernel(
+    "(n,2),(points,3,n),(points,3,n),(points),(points,w)->(points),(points,w)",
+    "f8 f8 f8 u1 f8 u1 f8",
 )
 def _footholds(limits, jacobian, angular, status, contact, verdict, numbers):
     """Judge points in blocks; with three actuators the number is a constant for the compiler.
@@ -467,7 +465,6 @@ def _footholds(limits, jacobian, angular, status, contact, verdict, numbers):
             judge_block(block, jacobian, angular, contact, numbers, start, end, n)
         for i in range(end - start):
             verdict[start + i] = int(block[VERDICT, i])
-    ignore_float_errors()
 
 
 @inlined

@@ -248,7 +248,7 @@ def test_a_value_out_of_range_is_named(change, named):
 def test_a_wrong_shape_is_named(change, named):
     with pytest.raises(ShapeError, match=named):
         evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"]._replace(**change))
-    with pytest.raises(ShapeError, match="foot_positions"):
+    with pytest.raises(ShapeError, match="foot_position"):
         evaluate_footholds(LEG, LIMITS, [[0.0, 1.0]], CONTACTS["level"])
     with pytest.raises(ShapeError, match="effort_limits"):
         evaluate_footholds(LEG, LIMITS[:2], CANDIDATES, CONTACTS["level"])

@@ -13,7 +13,7 @@ numbers whose signs tell the assembly (see `dyads`). A posture's closure is such
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -75,9 +75,9 @@ class Kernels(NamedTuple):
     """The compiled mathematics of one linkage; see any of the mechanisms for the signatures."""
 
     constants: Kernel
-    forward: Kernel
+    forward: Callable[..., Any]
     motion: Kernel
-    points: Kernel
+    points: Callable[..., Any]
     foot_in_plane: Kernel
     nearest: Kernel
     crossing: Kernel
@@ -376,11 +376,10 @@ class CrankLinkage(Dimensioned):
         return sides
 
     def _solve(self, q: FloatArray, sides: FloatArray) -> Any:
-        return self.kernels.forward(self._constants, sides, self.joint_limits[0], q, np.zeros(3))
+        return self.kernels.forward(self._constants, sides, self.joint_limits[0], q)
 
     def _points(self, q: FloatArray, sides: FloatArray) -> Any:
-        shape = np.zeros((len(self.point_names), 3))
-        return self.kernels.points(self._constants, sides, q, shape)
+        return self.kernels.points(self._constants, sides, q)
 
     def forward(self, joint_positions: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the foot, in closed form.

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
+from leg_kinematics.kernel import inlined, kernel, scalar
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -45,6 +45,7 @@ from leg_kinematics.mechanism import (
     offset,
     parameter,
 )
+from leg_kinematics.points_kernel import points_kernel
 from leg_kinematics.scalars import arctan2, included_angle, swing_plane, within, wrapped
 from leg_kinematics.status import Status
 
@@ -573,8 +574,7 @@ def jacobian_columns(
 # The inverse runs over blocks of points, with these rows:
 X, Q, CLOSURE, STATUS, J, OMEGA, ROWS = 0, 3, 6, 11, 12, 21, 30
 # An array of results costs a call as much as several points do. Joint positions and closure, whose
-# rows follow each other, therefore share one, as do both Jacobians. Arguments that set the lengths:
-COORDINATES, TWIST, CLOSURE_SHAPE = np.empty(8), np.empty(6), np.empty(5)
+# rows follow each other, therefore share one, as do both Jacobians.
 
 
 @inlined
@@ -610,8 +610,8 @@ def unpacked(parameters: FloatArray) -> tuple[Geometry, Branch, Numbers, Numbers
     )
 
 
-@kernel("(p),(c),(points,n)->(points,c),(points)", "f8[:], f8[:], f8[:,:], f8[:,:], u1[:]")
-def _inverse(parameters, shape, foot, coordinates, status):
+@points_kernel("(p),(points,3)->(points,8),(points)", "f8 f8 f8 u1")
+def _inverse(parameters, foot, coordinates, status):
     """Foot positions in {C} to crank angles and closure."""
     g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
@@ -623,14 +623,10 @@ def _inverse(parameters, shape, foot, coordinates, status):
         store(block, Q, coordinates, start, end, 8)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
-    ignore_float_errors()
 
 
-@kernel(
-    "(p),(c),(t),(points,n)->(points,c),(points),(points,t,n)",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], u1[:], f8[:,:,:]",
-)
-def _inverse_with_jacobians(parameters, shape, twist_shape, foot, coordinates, status, jacobians):
+@points_kernel("(p),(points,3)->(points,8),(points),(points,6,3)", "f8 f8 f8 u1 f8")
+def _inverse_with_jacobians(parameters, foot, coordinates, status, jacobians):
     """`_inverse` and, below each other, both Jacobians of the solved pose in one pass."""
     g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
@@ -649,7 +645,6 @@ def _inverse_with_jacobians(parameters, shape, twist_shape, foot, coordinates, s
         store_columns(block, OMEGA, jacobians[:, 3:], start, end, 3)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
-    ignore_float_errors()
 
 
 @scalar
@@ -689,28 +684,31 @@ def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArr
             jacobian[k, crank], angular[k, crank] = v[k], omega[k]
 
 
-@kernel("(p),(n),(c)->(n),(c),()", "f8[:], f8[:], f8[:], f8[:], f8[:], u1[:]")
-def _forward(parameters, q, shape, foot, closure, status):
+@points_kernel("(p),(points,3)->(points,3),(points,5),(points)", "f8 f8 f8 f8 u1")
+def _forward(parameters, q, foot, closure, status):
     """Crank angles to foot position in {C} and closure."""
     g, branch, rest, limits = unpacked(parameters)
-    status[0] = solve_cranks(g, branch, rest, limits, q, foot, closure)
+    for i in range(len(q)):
+        status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
 
 
-@kernel(
-    "(p),(n),(c)->(n),(c),(),(n,n),(n,n)",
-    "f8[:], f8[:], f8[:], f8[:], f8[:], u1[:], f8[:,:], f8[:,:]",
+@points_kernel(
+    "(p),(points,3)->(points,3),(points,5),(points),(points,3,3),(points,3,3)",
+    "f8 f8 f8 f8 u1 f8 f8",
 )
-def _forward_with_jacobians(parameters, q, shape, foot, closure, status, jacobian, angular):
+def _forward_with_jacobians(parameters, q, foot, closure, status, jacobian, angular):
     """`_forward` and both Jacobians of the solved pose in one pass."""
     g, branch, rest, limits = unpacked(parameters)
-    status[0] = solve_cranks(g, branch, rest, limits, q, foot, closure)
-    fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
+    for i in range(len(q)):
+        status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
+        fill_jacobians(g, pose_of_angles(g, q[i], closure[i]), jacobian[i], angular[i])
 
 
-@kernel("(g),(n),(c)->(n,n),(n,n)", "f8[:], f8[:], f8[:], f8[:,:], f8[:,:]")
+@points_kernel("(g),(points,3),(points,5)->(points,3,3),(points,3,3)", "f8 f8 f8 f8 f8")
 def _jacobians(geometry, q, closure, jacobian, angular):
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    fill_jacobians(g, pose_of_angles(g, q, closure), jacobian, angular)
+    for i in range(len(q)):
+        fill_jacobians(g, pose_of_angles(g, q[i], closure[i]), jacobian[i], angular[i])
 
 
 @kernel("(g),(n),(c),(w)->(n,w)", "f8[:], f8[:], f8[:], f8[:], f8[:,:]")
@@ -918,7 +916,7 @@ class ParallelDrive(Dimensioned):
             the mode's solution is unique; beyond the drive's singularity the status is SINGULAR.
         """
         q = as_array("joint_positions", joint_positions, 3)
-        foot, closure, status = _forward(self._parameters(assembly_mode), q, CLOSURE_SHAPE)
+        foot, closure, status = _forward(self._parameters(assembly_mode), q)
         return Posture(q, closure, foot, status)
 
     def forward_with_jacobians(
@@ -927,7 +925,7 @@ class ParallelDrive(Dimensioned):
         """`forward`, `jacobian` and `angular_jacobian` in one pass."""
         q = as_array("joint_positions", joint_positions, 3)
         foot, closure, status, jacobian, angular = _forward_with_jacobians(
-            self._parameters(assembly_mode), q, CLOSURE_SHAPE
+            self._parameters(assembly_mode), q
         )
         return Posture(q, closure, foot, status), jacobian, angular
 
@@ -942,7 +940,7 @@ class ParallelDrive(Dimensioned):
             The posture; NaN where the foot is out of reach.
         """
         foot = as_array("foot_position", foot_position, 3)
-        coordinates, status = _inverse(self._parameters(assembly_mode), COORDINATES, foot)
+        coordinates, status = _inverse(self._parameters(assembly_mode), foot)
         return Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
 
     def inverse_with_jacobians(
@@ -951,7 +949,7 @@ class ParallelDrive(Dimensioned):
         """`inverse`, `jacobian` and `angular_jacobian` in one pass, for half the price."""
         foot = as_array("foot_position", foot_position, 3)
         coordinates, status, jacobians = _inverse_with_jacobians(
-            self._parameters(assembly_mode), COORDINATES, TWIST, foot
+            self._parameters(assembly_mode), foot
         )
         posture = Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
         return posture, jacobians[..., :3, :], jacobians[..., 3:, :]

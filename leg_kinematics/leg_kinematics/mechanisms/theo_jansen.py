@@ -30,7 +30,7 @@ from leg_kinematics.dyads import (
     triangle_coefficients,
     turning_rate,
 )
-from leg_kinematics.kernel import ignore_float_errors, inlined, kernel, scalar
+from leg_kinematics.kernel import inlined, kernel, scalar
 from leg_kinematics.mechanism import Joint, flipped_modes, parameter
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
@@ -54,6 +54,7 @@ from leg_kinematics.mechanisms.crank_linkage import (
     store_points,
     turning_pin,
 )
+from leg_kinematics.points_kernel import points_kernel
 
 
 class Geometry(NamedTuple):
@@ -180,11 +181,8 @@ def constants_of_geometry(geometry, shape, constants):  # type: ignore[no-untype
         constants[i] = k[i]
 
 
-@kernel(
-    "(c),(s),(l),(points,n),(d)->(points,d),(points,s),(points)",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:], f8[:,:], f8[:,:], u1[:]",
-)
-def _forward(constants, sides, limits, q, shape, foot, closure, status):  # type: ignore[no-untyped-def]
+@points_kernel("(c),(s),(2),(points,1)->(points,3),(points,s),(points)", "f8 f8 f8 f8 f8 f8 u1")
+def _forward(constants, sides, limits, q, foot, closure, status):  # type: ignore[no-untyped-def]
     """Crank angles to foot in the leg frame, closure and status; `shape` sets the foot's length."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
     mode, bounds = to_fixed_tuple(sides, SIDES_SIZE), to_fixed_tuple(limits, 2)
@@ -197,7 +195,6 @@ def _forward(constants, sides, limits, q, shape, foot, closure, status):  # type
             worst = worst_transmission(k, p, assembly)
             put_forward(block, i, k.crank, bounds, p.g, assembly, worst)
         store_forward(block, foot, closure, status, start, end, SIDES_SIZE)
-    ignore_float_errors()
 
 
 @kernel("(c),(s),(n),(d)->(d),(d),(d)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
@@ -210,10 +207,8 @@ def _motion(constants, sides, q, shape, velocity, acceleration, turning):  # typ
     turning[0], turning[1], turning[2] = -turning_rate(p.c, p.f), 0.0, 0.0
 
 
-@kernel(
-    "(c),(points,s),(points,n),(p,d)->(points,p,d)", "f8[:], f8[:,:], f8[:,:], f8[:,:], f8[:,:,:]"
-)
-def _points(constants, sides, q, shape, points):  # type: ignore[no-untyped-def]
+@points_kernel(f"(c),(points,s),(points,1)->(points,{POINTS_SIZE},3)", "f8 f8 f8 f8")
+def _points(constants, sides, q, points):  # type: ignore[no-untyped-def]
     """All points in the leg frame."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
     block = np.empty((ROWS, BLOCK))
@@ -226,7 +221,6 @@ def _points(constants, sides, q, shape, points):  # type: ignore[no-untyped-def]
             p = linkage_points(k, mode, resting_pin(block, i))[0]
             put_points(block, POINTS, i, k.crank, p)
         store_points(block, POINTS, points, start, end, POINTS_SIZE)
-    ignore_float_errors()
 
 
 @kernel("(c),(s),(),(t)->(t)", "f8[:], f8[:], f8, f8[:], f8[:]")
