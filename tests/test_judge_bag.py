@@ -539,6 +539,10 @@ def test_ctrl_c_stops_cleanly_and_leaves_nothing(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(BagJudge, "take", interrupted)
     monkeypatch.chdir(tmp_path)
-    assert main([str(TRIPOD), "--output-bag", "copy"]) == 130
+    ignored = signal.signal(signal.SIGINT, signal.default_int_handler)  # by a shell's `&`, maybe
+    try:
+        assert main([str(TRIPOD), "--output-bag", "copy"]) == 130
+    finally:
+        signal.signal(signal.SIGINT, ignored)
     assert capsys.readouterr().err == "judge_bag: interrupted, nothing was written\n"
     assert list(tmp_path.iterdir()) == []

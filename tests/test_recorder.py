@@ -197,14 +197,15 @@ def test_nothing_is_lost_at_100_hz_for_six_legs(tmp_path):
 
 
 def test_every_message_of_1_khz_is_recorded_or_counted_as_lost(tmp_path):
-    """On a busy machine the middleware loses some of best effort; none of a reliable topic."""
+    """On a busy machine the middleware loses some; a reliable topic's publisher keeps a second."""
     with recording_legs(tmp_path) as record, sender(1000.0, 2.0, LEGS) as sending:
         sent = report_of(sending)["sent"]
         output = record.stop()
     assert "dropped:" not in output
     lacking = {topic: count for topic, (*_, count) in missing(tmp_path / "walk", sent).items()}
-    assert lacking.keys() <= {*BEST_EFFORT}
     assert_counted(lacking, output)
+    for reliable, best_effort in zip(RELIABLE, BEST_EFFORT, strict=True):
+        assert lacking.get(reliable, 0) <= lacking.get(best_effort, 0)
 
 
 def test_a_kill_loses_less_than_a_second(tmp_path):

@@ -53,6 +53,9 @@ _NAMELESS = ("_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_")
 WINDOW = 4
 # Inputs without an answer this long after the last one get none, such as those refused [s].
 PATIENCE = 1.0
+# The names of nodes and their services come at most so long after their endpoints, or never, if
+# they are not of ROS or have no parameters [s].
+DISCOVERY_PATIENCE = 3.0
 
 
 class ReplayError(Exception):
@@ -257,10 +260,7 @@ class _Session:
             self._wait_for(
                 subscription.get_publisher_count, f"nobody publishes {subscription.topic_name}"
             )
-        # The names of nodes come a moment after their endpoints, or never, if they are not of ROS.
-        patience = time.monotonic() + PATIENCE
-        while _NAMELESS in self._peers() and time.monotonic() < patience:
-            time.sleep(POLL_PERIOD)
+        self._wait_a_moment(lambda: _NAMELESS not in self._peers())
         for peer in self._peers() - {_NAMELESS}:
             self._greet(*peer)
 
@@ -316,11 +316,15 @@ class _Session:
     def _greet(self, name: str, namespace: str) -> None:
         """Wait until a node answers; one without parameters cannot be asked."""
         service = f"{namespace.rstrip('/')}/{name}/get_parameters"
-        try:
-            offered = dict(self._node.get_service_names_and_types_by_node(name, namespace))
-        except NodeNameNonExistentError:
-            raise ReplayError(f"{name} has ended") from None
-        if service not in offered:
+
+        def is_offered() -> bool:
+            try:
+                offered = self._node.get_service_names_and_types_by_node(name, namespace)
+            except NodeNameNonExistentError:
+                raise ReplayError(f"{name} has ended") from None
+            return service in dict(offered)
+
+        if not self._wait_a_moment(is_offered):
             return
         client = self._node.create_client(GetParameters, service)
         try:
@@ -329,6 +333,14 @@ class _Session:
             self._wait_for(answer.done, f"{service} does not answer")
         finally:
             self._node.destroy_client(client)
+
+    @staticmethod
+    def _wait_a_moment(is_so: Callable[[], bool]) -> bool:
+        """Tell whether something becomes so within `DISCOVERY_PATIENCE`."""
+        patience = time.monotonic() + DISCOVERY_PATIENCE
+        while not (so := is_so()) and time.monotonic() < patience:
+            time.sleep(POLL_PERIOD)
+        return so
 
     def _wait_for(self, find: Callable[[], Any], failure: str) -> Any:
         """Return the first true value of a function."""
