@@ -119,34 +119,47 @@ class Mechanism(Protocol):
         """Points and bars of the leg in this posture."""
 
 
-def inverse_with_jacobians(
-    mechanism: Mechanism, foot_position: ArrayLike, assembly_mode: str = ""
-) -> tuple[Posture, FloatArray, FloatArray]:
-    """Return `inverse`, `jacobian` and `angular_jacobian` of the same points.
+def twist_jacobian(mechanism: Mechanism, posture: Posture) -> FloatArray:
+    """Return `jacobian` above `angular_jacobian` (..., t + 3, n): the twist of the foot's body.
 
-    A mechanism may offer all three in one pass as a method of this name.
+    A mechanism may offer it in one pass, as a method of this name.
     """
-    one_pass = getattr(mechanism, "inverse_with_jacobians", None)
+    one_pass = getattr(mechanism, "twist_jacobian", None)
     if one_pass is not None:
-        result: tuple[Posture, FloatArray, FloatArray] = one_pass(foot_position, assembly_mode)
+        result: FloatArray = one_pass(posture)
+        return result
+    parts = mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
+    return np.concatenate(parts, axis=-2)
+
+
+def inverse_with_twist(
+    mechanism: Mechanism, foot_position: ArrayLike, assembly_mode: str = ""
+) -> tuple[Posture, FloatArray]:
+    """Return `inverse` and `twist_jacobian` of the same points.
+
+    A mechanism may offer both in one pass, as a method of this name.
+    """
+    one_pass = getattr(mechanism, "inverse_with_twist", None)
+    if one_pass is not None:
+        result: tuple[Posture, FloatArray] = one_pass(foot_position, assembly_mode)
         return result
     posture = mechanism.inverse(foot_position, assembly_mode)
-    return posture, mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
+    return posture, twist_jacobian(mechanism, posture)
 
 
-def forward_with_jacobians(
+def forward_with_twist(
     mechanism: Mechanism, joint_positions: ArrayLike, assembly_mode: str = ""
-) -> tuple[Posture, FloatArray, FloatArray]:
-    """Return `forward`, `jacobian` and `angular_jacobian` of the same points.
+) -> tuple[Posture, FloatArray]:
+    """Return `forward` and `twist_jacobian` of the same points.
 
-    A mechanism may offer all three in one pass as a method of this name.
+    A mechanism may offer both in one pass, as a method of this name.
     """
-    one_pass = getattr(mechanism, "forward_with_jacobians", None)
+    one_pass = getattr(mechanism, "forward_with_twist", None)
     if one_pass is not None:
-        result: tuple[Posture, FloatArray, FloatArray] = one_pass(joint_positions, assembly_mode)
+        result: tuple[Posture, FloatArray] = one_pass(joint_positions, assembly_mode)
         return result
     posture = mechanism.forward(joint_positions, assembly_mode)
-    return posture, mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
+    return posture, twist_jacobian(mechanism, posture)
 
 
 def parameter(doc: str, symbol: str, dimension: Dimension, default: float) -> Any:

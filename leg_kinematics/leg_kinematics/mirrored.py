@@ -14,8 +14,9 @@ from leg_kinematics.mechanism import (
     Linkage,
     Mechanism,
     Posture,
-    forward_with_jacobians,
-    inverse_with_jacobians,
+    forward_with_twist,
+    inverse_with_twist,
+    twist_jacobian,
 )
 
 # Reflection at the plane x = 0: a vector keeps its y and z, an axial vector (rotation, moment)
@@ -23,6 +24,7 @@ from leg_kinematics.mechanism import (
 VECTOR = np.array([-1.0, 1.0, 1.0])
 AXIAL = np.array([1.0, -1.0, -1.0])
 VECTOR_ROWS, AXIAL_ROWS = VECTOR[:, None], AXIAL[:, None]  # of Jacobians
+TWIST_ROWS = np.concatenate([VECTOR_ROWS, AXIAL_ROWS])
 
 
 def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
@@ -80,24 +82,26 @@ class Mirrored:
         q, closure, _, status = self.original.inverse(foot * VECTOR, assembly_mode)
         return Posture(q, closure, foot, status)
 
-    def inverse_with_jacobians(
+    def inverse_with_twist(
         self, foot_position: ArrayLike, assembly_mode: str = ""
-    ) -> tuple[Posture, FloatArray, FloatArray]:
-        """`inverse`, `jacobian` and `angular_jacobian` in one pass."""
+    ) -> tuple[Posture, FloatArray]:
+        """`inverse` and `twist_jacobian` in one pass."""
         foot = as_array("foot_position", foot_position, 3)
-        (q, closure, _, status), jacobian, angular = inverse_with_jacobians(
+        (q, closure, _, status), twist = inverse_with_twist(
             self.original, foot * VECTOR, assembly_mode
         )
-        return Posture(q, closure, foot, status), VECTOR_ROWS * jacobian, AXIAL_ROWS * angular
+        return Posture(q, closure, foot, status), TWIST_ROWS * twist
 
-    def forward_with_jacobians(
+    def forward_with_twist(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
-    ) -> tuple[Posture, FloatArray, FloatArray]:
-        """`forward`, `jacobian` and `angular_jacobian` in one pass."""
-        posture, jacobian, angular = forward_with_jacobians(
-            self.original, joint_positions, assembly_mode
-        )
-        return _reflected(posture), VECTOR_ROWS * jacobian, AXIAL_ROWS * angular
+    ) -> tuple[Posture, FloatArray]:
+        """`forward` and `twist_jacobian` in one pass."""
+        posture, twist = forward_with_twist(self.original, joint_positions, assembly_mode)
+        return _reflected(posture), TWIST_ROWS * twist
+
+    def twist_jacobian(self, posture: Posture) -> FloatArray:
+        """`jacobian` above `angular_jacobian` (..., 6, n)."""
+        return TWIST_ROWS * twist_jacobian(self.original, _reflected(posture))
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of v = J q' (..., 3, n)."""

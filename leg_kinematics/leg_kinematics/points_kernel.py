@@ -39,7 +39,7 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numba
@@ -96,23 +96,30 @@ class PointsKernel:
         self._results = [o for o in self._operands if o.is_result]
         # inputs that differ from point to point, and how many axes those of one point have
         self._of_points = [(k, len(o.core)) for k, o in enumerate(self._inputs) if o.of_points]
+        self._fold = lru_cache(self._new_fold)
         self.call = self._functions["call"]
         self.call.__doc__ = function.__doc__
 
     def of_batch(self, *arguments: Any) -> Any:
         """Make all leading axes of the points one, and give the results the same axes back."""
+        batch, folded = self._fold(*[argument.shape for argument in arguments])
         inputs = [*arguments]
-        shapes = [arguments[k].shape[: arguments[k].ndim - axes] for k, axes in self._of_points]
-        batch = common_batch(shapes)
-        for (k, _), leading in zip(self._of_points, shapes, strict=True):
-            if leading != batch or len(batch) > 1:
-                inputs[k] = _folded(arguments[k], leading, batch)
+        for k, leading in folded:
+            inputs[k] = _folded(arguments[k], leading, batch)
         results = self._functions["call_points"](math.prod(batch), *inputs)
         if len(batch) == 1:
             return results
         if len(self._results) == 1:
             return results.reshape(batch + results.shape[1:])
         return tuple([result.reshape(batch + result.shape[1:]) for result in results])
+
+    def _new_fold(
+        self, *shapes: tuple[int, ...]
+    ) -> tuple[tuple[int, ...], list[tuple[int, tuple[int, ...]]]]:
+        """Return the axes of a batch and, of each input that has others, its index and axes."""
+        leading = {k: shapes[k][: len(shapes[k]) - axes] for k, axes in self._of_points}
+        batch = common_batch(leading.values())
+        return batch, [(k, a) for k, a in leading.items() if a != batch or len(batch) != 1]
 
     @cached_property
     def over_points(self) -> Any:

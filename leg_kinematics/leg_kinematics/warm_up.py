@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from leg_kinematics.conditioning import condition_number
-from leg_kinematics.mechanism import inverse_with_jacobians
+from leg_kinematics.mechanism import inverse_with_twist
 from leg_kinematics.robot import Robot
 
 
@@ -15,4 +15,4 @@ def warm_up_kinematics(robot: Robot) -> None:
         condition_number(mechanism.jacobian(posture))
         mechanism.angular_jacobian(posture)
         mechanism.passive_joint_positions(posture)
-        inverse_with_jacobians(mechanism, foot)
+        inverse_with_twist(mechanism, foot)

@@ -6,15 +6,11 @@ A batch travels as a flat, row-major field: an array (..., k) becomes a field of
 from __future__ import annotations
 
 import array
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-# Type codes of `array.array` for the numpy types that message fields of the suite have.
-TYPE_CODES = {np.dtype(np.float64): "d", np.dtype(np.uint8): "B", np.dtype(np.int32): "i"}
 
 
 def to_field(values: ArrayLike, dtype: Any = np.float64) -> array.array[Any]:
@@ -24,11 +20,8 @@ def to_field(values: ArrayLike, dtype: Any = np.float64) -> array.array[Any]:
         values: Numbers of any shape; row-major order is kept, whatever the memory layout.
         dtype: Type of the field: float64, uint8 or int32.
     """
-    flat = np.ascontiguousarray(values, dtype=dtype)
-    field = array.array(TYPE_CODES[flat.dtype])
-    if flat.size:  # a view of nothing cannot be cast
-        field.frombytes(flat.data.cast("B"))
-    return field
+    numbers = np.asarray(values, dtype=dtype)
+    return array.array(numbers.dtype.char, numbers.tobytes())
 
 
 def from_field(field: Any, shape: Sequence[int] = (-1,), dtype: Any = np.float64) -> NDArray[Any]:
@@ -43,11 +36,10 @@ def from_field(field: Any, shape: Sequence[int] = (-1,), dtype: Any = np.float64
         ValueError: If the number of values does not fit the shape.
     """
     dtype = np.dtype(dtype)
-    if isinstance(field, array.array) and field.typecode == TYPE_CODES.get(dtype):
+    if isinstance(field, array.array) and field.typecode == dtype.char:
         flat: NDArray[Any] = np.frombuffer(field, dtype=dtype) if len(field) else np.empty(0, dtype)
     else:
         flat = np.asarray(field, dtype=dtype)
-    known = math.prod(n for n in shape if n >= 0)
-    if -1 in shape and known == 0:  # numpy cannot tell the length of that axis
+    if not flat.size and 0 in shape:  # numpy cannot tell the length of an axis -1
         shape = [0 if n == -1 else n for n in shape]
     return flat.reshape(tuple(shape))

@@ -62,7 +62,8 @@ def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
         RequestError: If a value is out of range.
     """
     moment = frame.vectors_to_leg(_finite("required_moment", request.required_moment))
-    return read_ground(grounds, request.ground, frame)._replace(
+    return Contact(
+        *read_ground(grounds, request.ground, frame)[:2],
         load=_magnitude("required_load", request.required_load, "N"),
         moment=_numbers(moment),
         any_moment=_magnitude("any_direction_moment", request.any_direction_moment, "N.m"),

@@ -31,7 +31,7 @@ from leg_kinematics.blocks import (
 )
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
 from leg_kinematics.kernel import inlined, scalar
-from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_jacobians
+from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_twist
 from leg_kinematics.points_kernel import points_kernel
 from leg_kinematics.status import Status
 from leg_statics.capacity import check_effort_limits, check_normals, difference, unit
@@ -165,7 +165,7 @@ class Footholds(NamedTuple):
     @property
     def feasible(self) -> NDArray[np.bool_]:
         """Whether the leg carries the required load."""
-        return np.asarray(self.verdict == Verdict.FEASIBLE)
+        return np.asarray(self.verdict == FEASIBLE)
 
     def ranking(self) -> NDArray[np.int64]:
         """Flat indices of the feasible candidates, largest load capacity first.
@@ -201,43 +201,34 @@ def evaluate_footholds(
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
-    posture, jacobian, angular = inverse_with_jacobians(mechanism, foot_position)
-    return _judged(mechanism, posture, jacobian, angular, effort_limits, contact)
+    posture, twist = inverse_with_twist(mechanism, foot_position)
+    return _judged(mechanism, posture, twist, effort_limits, contact)
 
 
 def judge_footholds(
     kinematics: Kinematics, effort_limits: ArrayLike, contact: Contact
 ) -> Footholds:
     """Evaluate solved postures as footholds; see `evaluate_footholds`."""
-    return _judged(
-        kinematics.mechanism,
-        kinematics.posture,
-        kinematics.jacobian,
-        kinematics.angular_jacobian,
-        effort_limits,
-        contact,
-    )
+    twist = kinematics.twist_jacobian
+    return _judged(kinematics.mechanism, kinematics.posture, twist, effort_limits, contact)
 
 
 def _judged(
     mechanism: Mechanism,
     posture: Posture,
-    jacobian: FloatArray,
-    angular_jacobian: FloatArray,
+    twist_jacobian: FloatArray,
     effort_limits: ArrayLike,
     contact: Contact,
 ) -> Footholds:
-    tasks, n = jacobian.shape[-2:]
-    if tasks != 3:
+    rows, n = twist_jacobian.shape[-2:]
+    if rows != 6:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has task coordinates "
             f"{', '.join(mechanism.task_coordinates)}: load capacity needs a point foot x, y, z"
         )
     limits = as_array("effort_limits", effort_limits, n, 2)
     try:
-        verdict, numbers = _footholds(
-            limits, jacobian, angular_jacobian, posture.status, _rows(contact, n)
-        )
+        verdict, numbers = _footholds(limits, twist_jacobian, posture.status, _rows(contact, n))
     except ValueError:
         shapes = {"candidates": np.shape(posture.status), **_leading_shapes(_arrays(contact, n))}
         raise broadcast_error(shapes) from None
@@ -438,11 +429,8 @@ def share_of_limits(effort, reserve, least, most):
     return below if below > above else above
 
 
-@points_kernel(
-    "(n,2),(points,3,n),(points,3,n),(points),(points,w)->(points),(points,w)",
-    "f8 f8 f8 u1 f8 u1 f8",
-)
-def _footholds(limits, jacobian, angular, status, contact, verdict, numbers):
+@points_kernel("(n,2),(points,6,n),(points),(points,w)->(points),(points,w)", "f8 f8 u1 f8 u1 f8")
+def _footholds(limits, twist, status, contact, verdict, numbers):
     """Judge points in blocks; with three actuators the number is a constant for the compiler.
 
     What a contact says and what is found of it stand in one row each, because every array costs a
@@ -460,20 +448,20 @@ def _footholds(limits, jacobian, angular, status, contact, verdict, numbers):
         end = min(start + BLOCK, len(status))
         load_numbers(block, STATUS, status, start, end)
         if n == 3:
-            judge_block(block, jacobian, angular, contact, numbers, start, end, 3)
+            judge_block(block, twist, contact, numbers, start, end, 3)
         else:
-            judge_block(block, jacobian, angular, contact, numbers, start, end, n)
+            judge_block(block, twist, contact, numbers, start, end, n)
         for i in range(end - start):
             verdict[start + i] = int(block[VERDICT, i])
 
 
 @inlined
-def judge_block(block, jacobian, angular, contact, numbers, start, end, n):
+def judge_block(block, twist, contact, numbers, start, end, n):
     """Judge points start to end, whose status is in the block."""
     load(block, MU, contact, start, end, OF_CONTACT)
     load(block, row_of(BIAS, n, 0), contact[:, OF_CONTACT:], start, end, n)
-    load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
-    load_columns(block, row_of(OMEGA, n, 0), angular, start, end, n)
+    load_columns(block, row_of(J, n, 0), twist[:, :3], start, end, n)
+    load_columns(block, row_of(OMEGA, n, 0), twist[:, 3:], start, end, n)
     for i in range(end - start):
         prepare(block, i, n)
     if n == 3:
@@ -481,7 +469,7 @@ def judge_block(block, jacobian, angular, contact, numbers, start, end, n):
             solve_three(block, i)
     for i in range(end - start):
         if block[HOLDS, i] == 1.0 and block[VALID, i] == 1.0 and block[CERTAIN, i] == 0.0:
-            solve_any(block, i, n, jacobian[start + i])
+            solve_any(block, i, n, twist[start + i, :3])
     for i in range(end - start):
         judge(block, i, n)
     store(block, NUMBERS, numbers, start, end, OF_POINT - NUMBERS + n)

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.mechanism import Mechanism, Posture
+from leg_kinematics.mechanism import Mechanism, Posture, twist_jacobian
 
 
 class Kinematics:
@@ -22,16 +22,19 @@ class Kinematics:
         self.posture = posture
 
     @cached_property
+    def twist_jacobian(self) -> FloatArray:
+        """J above J_omega (..., t + 3, n)."""
+        return twist_jacobian(self.mechanism, self.posture)
+
+    @property
     def jacobian(self) -> FloatArray:
         """J of v = J q' (..., t, n)."""
-        jacobian: FloatArray = self.mechanism.jacobian(self.posture)
-        return jacobian
+        return self.twist_jacobian[..., :-3, :]
 
-    @cached_property
+    @property
     def angular_jacobian(self) -> FloatArray:
         """J_omega of omega = J_omega q' (..., 3, n)."""
-        jacobian: FloatArray = self.mechanism.angular_jacobian(self.posture)
-        return jacobian
+        return self.twist_jacobian[..., -3:, :]
 
     @cached_property
     def constraint_jacobian(self) -> FloatArray:

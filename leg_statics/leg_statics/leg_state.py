@@ -13,7 +13,7 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.conditioning import condition_of_point
 from leg_kinematics.kernel import kernel
-from leg_kinematics.mechanism import forward_with_jacobians
+from leg_kinematics.mechanism import forward_with_twist
 from leg_kinematics.status import Status
 from leg_statics.capacity import capacity_of_point
 from leg_statics.efforts import utilisation_of_point
@@ -67,10 +67,10 @@ def leg_states(
         joint_velocities: Joint velocities (..., L, n) [rad/s or m/s]; NaN if not known.
         joint_efforts: Present joint efforts (..., L, n) [N.m or N]; NaN if not known.
     """
-    posture, jacobian, _ = forward_with_jacobians(group.mechanism, joint_positions)
+    posture, twist = forward_with_twist(group.mechanism, joint_positions)
     bias = np.zeros(len(group.mechanism.joints))  # the leg's own weight is ignored
     velocity, condition, capacity, mu_e, used = _leg_states(
-        jacobian,
+        twist[..., :3, :],
         posture.status,
         group.lower,
         group.upper,

@@ -576,6 +576,11 @@ class CrankLinkage(Dimensioned):
         turning: FloatArray = self._motion(posture)[2]
         return turning[..., None]
 
+    def twist_jacobian(self, posture: Posture) -> FloatArray:
+        """J above J_omega (..., 6, 1), in one pass."""
+        velocity, _, turning = self._motion(posture)
+        return np.concatenate([velocity, turning], axis=-1)[..., None]
+
     def acceleration(
         self, posture: Posture, joint_velocities: ArrayLike, joint_accelerations: ArrayLike
     ) -> FloatArray:

@@ -626,7 +626,7 @@ def _inverse(parameters, foot, coordinates, status):
 
 
 @points_kernel("(p),(points,3)->(points,8),(points),(points,6,3)", "f8 f8 f8 u1 f8")
-def _inverse_with_jacobians(parameters, foot, coordinates, status, jacobians):
+def _inverse_with_twist(parameters, foot, coordinates, status, twist):
     """`_inverse` and, below each other, both Jacobians of the solved pose in one pass."""
     g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
@@ -641,8 +641,8 @@ def _inverse_with_jacobians(parameters, foot, coordinates, status, jacobians):
                 put(block, J + 3 * crank, i, v)
                 put(block, OMEGA + 3 * crank, i, omega)
         store(block, Q, coordinates, start, end, 8)
-        store_columns(block, J, jacobians[:, :3], start, end, 3)
-        store_columns(block, OMEGA, jacobians[:, 3:], start, end, 3)
+        store_columns(block, J, twist[:, :3], start, end, 3)
+        store_columns(block, OMEGA, twist[:, 3:], start, end, 3)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
 
@@ -675,13 +675,13 @@ def solve_cranks(
 
 
 @scalar
-def fill_jacobians(g: Geometry, p: Pose, jacobian: FloatArray, angular: FloatArray) -> None:
-    """Fill J of equation (1), foot velocity, and J_omega of (2), angular velocity of R2C."""
+def fill_twist(g: Geometry, p: Pose, twist: FloatArray) -> None:
+    """Fill J of equation (1), foot velocity, above J_omega of (2), angular velocity of R2C."""
     f1, f2 = gradients(g, p)
     for crank in range(3):
         v, omega = jacobian_columns(g, p, f1, f2, crank)
         for k in range(3):
-            jacobian[k, crank], angular[k, crank] = v[k], omega[k]
+            twist[k, crank], twist[3 + k, crank] = v[k], omega[k]
 
 
 @points_kernel("(p),(points,3)->(points,3),(points,5),(points)", "f8 f8 f8 f8 u1")
@@ -692,23 +692,20 @@ def _forward(parameters, q, foot, closure, status):
         status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
 
 
-@points_kernel(
-    "(p),(points,3)->(points,3),(points,5),(points),(points,3,3),(points,3,3)",
-    "f8 f8 f8 f8 u1 f8 f8",
-)
-def _forward_with_jacobians(parameters, q, foot, closure, status, jacobian, angular):
-    """`_forward` and both Jacobians of the solved pose in one pass."""
+@points_kernel("(p),(points,3)->(points,3),(points,5),(points),(points,6,3)", "f8 f8 f8 f8 u1 f8")
+def _forward_with_twist(parameters, q, foot, closure, status, twist):
+    """`_forward` and, below each other, both Jacobians of the solved pose in one pass."""
     g, branch, rest, limits = unpacked(parameters)
     for i in range(len(q)):
         status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
-        fill_jacobians(g, pose_of_angles(g, q[i], closure[i]), jacobian[i], angular[i])
+        fill_twist(g, pose_of_angles(g, q[i], closure[i]), twist[i])
 
 
-@points_kernel("(g),(points,3),(points,5)->(points,3,3),(points,3,3)", "f8 f8 f8 f8 f8")
-def _jacobians(geometry, q, closure, jacobian, angular):
+@points_kernel("(g),(points,3),(points,5)->(points,6,3)", "f8 f8 f8 f8")
+def _twist(geometry, q, closure, twist):
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     for i in range(len(q)):
-        fill_jacobians(g, pose_of_angles(g, q[i], closure[i]), jacobian[i], angular[i])
+        fill_twist(g, pose_of_angles(g, q[i], closure[i]), twist[i])
 
 
 @kernel("(g),(n),(c),(w)->(n,w)", "f8[:], f8[:], f8[:], f8[:], f8[:,:]")
@@ -919,15 +916,13 @@ class ParallelDrive(Dimensioned):
         foot, closure, status = _forward(self._parameters(assembly_mode), q)
         return Posture(q, closure, foot, status)
 
-    def forward_with_jacobians(
+    def forward_with_twist(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
-    ) -> tuple[Posture, FloatArray, FloatArray]:
-        """`forward`, `jacobian` and `angular_jacobian` in one pass."""
+    ) -> tuple[Posture, FloatArray]:
+        """`forward` and `twist_jacobian` in one pass."""
         q = as_array("joint_positions", joint_positions, 3)
-        foot, closure, status, jacobian, angular = _forward_with_jacobians(
-            self._parameters(assembly_mode), q
-        )
-        return Posture(q, closure, foot, status), jacobian, angular
+        foot, closure, status, twist = _forward_with_twist(self._parameters(assembly_mode), q)
+        return Posture(q, closure, foot, status), twist
 
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the cranks, in closed form.
@@ -943,24 +938,26 @@ class ParallelDrive(Dimensioned):
         coordinates, status = _inverse(self._parameters(assembly_mode), foot)
         return Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
 
-    def inverse_with_jacobians(
+    def inverse_with_twist(
         self, foot_position: ArrayLike, assembly_mode: str = ""
-    ) -> tuple[Posture, FloatArray, FloatArray]:
-        """`inverse`, `jacobian` and `angular_jacobian` in one pass, for half the price."""
+    ) -> tuple[Posture, FloatArray]:
+        """`inverse` and `twist_jacobian` in one pass, for half the price."""
         foot = as_array("foot_position", foot_position, 3)
-        coordinates, status, jacobians = _inverse_with_jacobians(
-            self._parameters(assembly_mode), foot
-        )
-        posture = Posture(coordinates[..., :3], coordinates[..., 3:], foot, status)
-        return posture, jacobians[..., :3, :], jacobians[..., 3:, :]
+        coordinates, status, twist = _inverse_with_twist(self._parameters(assembly_mode), foot)
+        return Posture(coordinates[..., :3], coordinates[..., 3:], foot, status), twist
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of the foot's velocity, v = J q' (..., 3, 3) [m/rad]; equation (1)."""
-        return _jacobians(self._geometry, posture.joint_positions, posture.closure)[0]
+        return self.twist_jacobian(posture)[..., :3, :]
 
     def angular_jacobian(self, posture: Posture) -> FloatArray:
         """J_omega of the shank's angular velocity, omega = J_omega q' (..., 3, 3); equation (2)."""
-        return _jacobians(self._geometry, posture.joint_positions, posture.closure)[1]
+        return self.twist_jacobian(posture)[..., 3:, :]
+
+    def twist_jacobian(self, posture: Posture) -> FloatArray:
+        """J above J_omega (..., 6, 3), in one pass."""
+        twist: FloatArray = _twist(self._geometry, posture.joint_positions, posture.closure)
+        return twist
 
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
         """Excursions of the passive joints from the initial posture (..., 9) [rad].
