@@ -27,7 +27,7 @@ from rich.markup import escape  # noqa: E402
 HERE = Path(__file__).resolve().parent
 sys.path.insert(1, str(HERE.parent / "tools"))
 
-from harness import Row, Settings  # noqa: E402
+from harness import Row, Settings, measure, timed_row  # noqa: E402
 from report import describe_machine, results_table, row_record  # noqa: E402
 
 # Each is a module with a function `rows(settings)` that yields `Row`s.
@@ -111,6 +111,7 @@ def run_entry(
             status.update(f"{name}: {escape(text)} ...")
 
         settings = Settings(arguments.quick, arguments.soak, show)
+        rows.append(pace_row("before", settings))
         try:
             for row in entry_rows(name, settings):
                 rows.append(row)
@@ -118,9 +119,21 @@ def run_entry(
         except Exception as failure:  # the other entries shall still run
             error = f"{type(failure).__name__}: {failure}"
             console.print(escape(traceback.format_exc()), style="red")
+        rows.append(pace_row("after", settings))
     console.print(results_table(f"{name}: {ENTRIES[name]}", rows))
     console.print(f"[dim]{time.perf_counter() - started:.0f} s[/dim]\n")
     return rows, error
+
+
+def pace_row(when: str, settings: Settings) -> Row:
+    """Return how fast the machine is at the moment: a shared one is not always the same."""
+
+    def loop() -> None:
+        for _ in range(100_000):
+            pass
+
+    note = "100,000 turns of an empty Python loop"
+    return timed_row(f"pace of the machine {when}", measure(loop, settings), note=note)
 
 
 def entry_rows(name: str, settings: Settings) -> Iterator[Row]:

@@ -95,6 +95,10 @@ def one_point(calls: dict[str, Callable[[], Any]], settings: Settings) -> Iterat
     for name, median in medians.items():
         goal = None if name.endswith(IDLE) else ONE_POINT
         yield Row(f"{name} / {EMPTY}", median / empty, "x", goal=goal)
+        if name + IDLE in medians:
+            share = median / medians[name + IDLE]
+            note = "what the node itself adds"
+            yield Row(f"{name} / the same{IDLE}", share, "x", goal=ONE_POINT, note=note)
 
 
 def through_leg_client(foot: FloatArray, settings: Settings) -> Iterator[Row]:
