@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from harness import Goal, Row, Settings, Timing, measure, missing_row
+from harness import Goal, Row, Settings, Timing, measure, missing_row, timed_row
 from leg_msgs.msg import Ground
 from leg_msgs.srv import InverseKinematics, QueryFootholds
 from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.client import LegClient
+from rclpy.serialization import deserialize_message, serialize_message
 from ros import Client, child, suite_nodes
 from std_srvs.srv import Trigger
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
@@ -50,24 +51,25 @@ def rows(settings: Settings) -> Iterator[Row]:
         idle_inverse = client.service(InverseKinematics, "/empty/inverse_kinematics")
         idle_footholds = client.service(QueryFootholds, "/empty/query_footholds")
 
-        calls: dict[str, Callable[[], Any]] = {
-            EMPTY: lambda: client.call(trigger, Trigger.Request()),
-            "inverse_kinematics": lambda: client.call(inverse, inverse_request(feet[0])),
-            f"inverse_kinematics{IDLE}": lambda: client.call(
-                idle_inverse, inverse_request(feet[0])
-            ),
+        make = {
+            EMPTY: Trigger.Request,
+            "inverse_kinematics": lambda: inverse_request(feet[0]),
+            "query_footholds": lambda: foothold_request(feet[0]),
         }
+        services = {EMPTY: (trigger,), "inverse_kinematics": (inverse, idle_inverse)}
         if footholds is not None:
-            calls |= {
-                "query_footholds": lambda: client.call(footholds, foothold_request(feet[0])),
-                f"query_footholds{IDLE}": lambda: client.call(
-                    idle_footholds, foothold_request(feet[0])
-                ),
-            }
+            services["query_footholds"] = (footholds, idle_footholds)
         else:
             yield missing_row("query_footholds", "the statics node does not serve it")
+        calls: dict[str, Callable[[], Any]] = {
+            name + suffix: lambda service=service, name=name: client.call(service, make[name]())
+            for name, both in services.items()
+            for service, suffix in zip(both, ("", IDLE), strict=False)
+        }
         settings.show("one point")
         yield from one_point(calls, settings)
+        for name in services:
+            yield messages_row(name, make[name], calls[name](), settings)
         yield from through_leg_client(feet[0], settings)
 
         settings.show(f"{BATCH:,} points")
@@ -99,6 +101,21 @@ def one_point(calls: dict[str, Callable[[], Any]], settings: Settings) -> Iterat
             share = median / medians[name + IDLE]
             note = "what the node itself adds"
             yield Row(f"{name} / the same{IDLE}", share, "x", goal=ONE_POINT, note=note)
+
+
+def messages_row(
+    name: str, make_request: Callable[[], Any], response: Any, settings: Settings
+) -> Row:
+    """Return what both sides of a call do with its messages, without network and node."""
+
+    def handle() -> None:
+        request = make_request()
+        deserialize_message(serialize_message(request), type(request))
+        type(response)()  # the node gets one to fill
+        deserialize_message(serialize_message(response), type(response))
+
+    note = "made, serialised and read by rosidl in a loop in this process"
+    return timed_row(f"{name}, its messages", measure(handle, settings), note=note)
 
 
 def through_leg_client(foot: FloatArray, settings: Settings) -> Iterator[Row]:

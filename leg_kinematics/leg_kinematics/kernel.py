@@ -16,8 +16,8 @@ What computes many points with one instruction is a `points_kernel`.
 
 Scalar code calls other scalar code by its global name; numba cannot cache functions that come as
 arguments or in closures. Compiled code is cached between processes. The cache folder of a kernel is
-named after a digest of the sources of everything the kernel calls, because numba itself notices
-only edits of the file in which the kernel stands.
+named after a digest of the code of everything the kernel calls, because numba itself notices only
+edits of the file in which the kernel stands.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import hashlib
-import inspect
-import math
 import os
 import sys
 import tempfile
@@ -35,6 +33,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numba
@@ -87,20 +86,24 @@ def at_real_path(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def compile_or_load(
-    function: Callable[..., None], compiled: Callable[[bool], Any], around: str = ""
+    function: Callable[..., None],
+    compiled: Callable[[bool], Any],
+    name: str = "",
+    source: str = "",
 ) -> Any:
     """Return what `compiled` makes, with a folder for numba's cache if it is told to use one.
 
     Args:
         function: The kernel's function.
         compiled: Compiles it, or loads it from the cache.
-        around: Source that is compiled around it.
+        name: Name of the function that is compiled, if it is one around the kernel's.
+        source: Source of that function.
     """
-    folder = _cache_folder(function, around)
+    folder = _cache_folder(function, source)
     with _thread_lock, _process_lock(folder):
-        if folder is None or not any(folder.rglob("*.nbi")):
-            name = f"{function.__module__}.{function.__qualname__}"
-            print(f"compiling {name} for this machine (once)", file=sys.stderr, flush=True)
+        if folder is None or not any(folder.rglob(f"*{name or function.__name__}-*.nbi")):
+            what = ".".join(filter(None, (function.__module__, function.__qualname__, name)))
+            print(f"compiling {what} for this machine (once)", file=sys.stderr, flush=True)
         previous = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or previous)
         try:
@@ -119,11 +122,11 @@ def kernel(layout: str, types: str) -> Callable[[Callable[..., None]], Kernel]:
     return lambda function: Kernel(function, layout, types)
 
 
-def _cache_folder(function: Callable[..., None], around: str) -> Path | None:
+def _cache_folder(function: Callable[..., None], source: str) -> Path | None:
     """Return a writable folder for the compiled code of `function`, or None without one."""
     roots = [os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME"), "~/.cache"]
     for root in filter(None, roots):
-        folder = Path(root).expanduser() / "leg_kernels" / _digest(function, around)
+        folder = Path(root).expanduser() / "leg_kernels" / _digest(function, source)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -149,27 +152,38 @@ def _process_lock(folder: Path | None) -> Iterator[None]:
         yield
 
 
-def _digest(function: Callable[..., None], around: str) -> str:
-    """Return a digest of the sources of `function`, of all scalar code it calls and around it."""
+def _digest(function: Callable[..., None], source: str) -> str:
+    """Return a digest of `function`, of all scalar code it calls and of the source around it."""
     # cached code finds its globals by the name of the module
     origin = [numba.__version__, str(sys.implementation.cache_tag), function.__module__]
-    parts = [*origin, around, *sorted(set(_sources(function, set())))]
+    parts = [*origin, source, *sorted(set(_meanings(function, set())))]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 
-def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield the source of `function`, of its callees and the constants they use."""
+def _meanings(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
+    """Yield the bytecode of `function` and of its callees, and the constants that they use.
+
+    The sources would tell as much, but take a hundred times as long to find.
+    """
     if function in seen:
         return
     seen.add(function)
-    yield inspect.getsource(function)
-    for name in function.__code__.co_names:
-        value = function.__globals__.get(name)
-        if isinstance(value, Dispatcher):
-            yield from _sources(value.py_func, seen)
-        elif isinstance(value, (int, float)) and not (
-            isinstance(value, float) and math.isnan(value)
-        ):
-            yield f"{name}={value!r}"
-        elif isinstance(value, type):
-            yield f"{name}={getattr(value, '_fields', value)!r}"
+    for code in _codes(function.__code__):
+        constants = [c for c in code.co_consts if not isinstance(c, CodeType)]
+        yield repr((code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants))
+        for name in code.co_names:
+            value = function.__globals__.get(name)
+            if isinstance(value, Dispatcher):
+                yield from _meanings(value.py_func, seen)
+            elif isinstance(value, (int, float)) and value == value:  # no NaN
+                yield f"{name}={value!r}"
+            elif isinstance(value, type):
+                yield f"{name}={getattr(value, '_fields', value)!r}"
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield a code object and those within it, such as of comprehensions."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)

@@ -141,7 +141,7 @@ class PointsKernel:
         def compiled(cache: bool) -> Any:
             return numba.njit(tuple(signature), cache=cache, **options)(function)
 
-        return compile_or_load(self.function, compiled, self._source)
+        return compile_or_load(self.function, compiled, name, self._source)
 
     @cached_property
     def _functions(self) -> dict[str, Any]:

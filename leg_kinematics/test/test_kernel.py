@@ -78,6 +78,8 @@ def test_compiled_code_is_cached_and_an_edited_callee_invalidates_it(program, tm
     assert "compiling user.twice" in cold.stderr
     assert "compiling" not in warm.stderr
     helper = program / "helper.py"
+    helper.write_text("# a comment\n" + helper.read_text())
+    assert "compiling" not in run(program, cache).stderr
     helper.write_text(helper.read_text().replace("2.0", "5.0"))
     edited = run(program, cache)
     assert edited.stdout == "15.0\n"
