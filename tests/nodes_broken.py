@@ -1,6 +1,8 @@
 """A node whose callbacks fail, and that logs by Python's `logging`; the tests run it."""
 
+import contextlib
 import logging
+import signal
 import sys
 
 from std_srvs.srv import Trigger
@@ -9,10 +11,16 @@ from leg_kinematics.robot_node import RobotNode, run
 
 
 class BrokenNode(RobotNode):
-    """Fails in a timer and in a service; answers in another service."""
+    """Fails in a timer and in a service; answers in another service.
+
+    With the argument "swallow" it swallows an interrupt at the start, as a compiler may.
+    """
 
     def __init__(self):
         super().__init__("broken")
+        if sys.argv[1:] == ["swallow"]:
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
         self.create_timer(0.02, self.fail)
         self.create_service(Trigger, "~/fail", self.fail)
         self.create_service(Trigger, "~/work", self.work)

@@ -44,6 +44,17 @@ def test_callbacks_that_fail_stop_neither_the_node_nor_its_other_services(log):
     assert "[broken]: solver: no answer for 3 points" in text.splitlines()[0]
 
 
+def test_an_interrupt_that_something_swallows_at_the_start_ends_the_node_all_the_same():
+    done = subprocess.run(
+        [sys.executable, BROKEN_NODE, "swallow"],
+        capture_output=True,
+        text=True,
+        timeout=START_TIMEOUT,
+    )
+    assert done.returncode == 0
+    assert "[broken]: ready" in done.stderr
+
+
 def test_a_flood_of_bad_messages_is_counted_and_logged_once(log):
     count = 400
     with (

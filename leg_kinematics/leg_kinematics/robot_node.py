@@ -366,6 +366,8 @@ def _spin_until_signal(make_node: Callable[[], RobotNode]) -> int:
     _handle_signals(_interrupt)  # the executor took them for itself
     spinner = _Spinner(executor, make_node())
     try:
+        if _stop_asked.is_set():
+            raise KeyboardInterrupt
         spinner.ended.wait()
         return 1
     finally:
@@ -377,9 +379,17 @@ def _handle_signals(handler: Any) -> None:
         signal.signal(number, handler)
 
 
+_stop_asked = threading.Event()
+
+
 def _interrupt(*_: object) -> None:
-    """Raise a KeyboardInterrupt at the first signal; further ones shall not disturb the end."""
+    """Raise a KeyboardInterrupt at the first signal; further ones shall not disturb the end.
+
+    The signal is kept in mind, because what it meets at the start may swallow the exception, as
+    numba's compiler does now and then.
+    """
     _handle_signals(lambda *_: None)
+    _stop_asked.set()
     raise KeyboardInterrupt
 
 
