@@ -8,7 +8,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from leg_msgs_py import errors
-from leg_msgs_py.bags import Bag, BagWriter
+from leg_msgs_py.bags import Bag, BagError, BagWriter
 from leg_msgs_py.client import Ground, LegClient
 from leg_msgs_py.definitions import message_definition
 from node_processes import NodeProcesses
@@ -66,6 +66,14 @@ def set_events(client, state):
     return set_parameter(client.node, "planner/statics", "service_events", state)
 
 
+def topics_of(record):
+    """Return the topics of which something is recorded already."""
+    try:
+        return set(Bag(record.folder).counts)
+    except BagError:  # nothing yet
+        return set()
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A recording of a planner's queries, and what the planner was answered."""
@@ -77,15 +85,17 @@ def recorded(tmp_path_factory):
         RecordProcess(folder, "--topics", f"{NODE}/*") as record,
     ):
         wait_for(lambda: client.node.count_publishers(FOOTHOLDS), START_TIMEOUT)
-        while record.size() < 50_000:  # what is sent before both sides are connected is lost
-            client.query_footholds("right_front", feet(100), "cement", 300.0)
         refused = set_events(client, "all")
         assert not refused.successful
         assert "got 'all'; allowed: off, metadata, contents" in refused.reason
-        for state in ("off", "metadata"):
-            assert set_events(client, state).successful
+        assert set_events(client, "off").successful
+        client.query_footholds("right_middle", feet(5), "cement", 300.0)
+        assert set_events(client, "metadata").successful
+        while FOOTHOLDS not in topics_of(record):  # what is sent before both sides know is lost
             client.query_footholds("right_middle", feet(5), "cement", 300.0)
         assert set_events(client, "contents").successful
+        while STEPS not in topics_of(record):
+            client.query_step_length("right_front", [-0.65], "cement", 100.0)
         answers = ask(client)
         output = record.stop()
         assert record.process.returncode == 0, output
@@ -141,7 +151,7 @@ def test_answers_are_those_of_the_node_bit_for_bit(recorded):
     assert len(planned) == 12
     assert judge.unanswered == 0
     assert judge.without_request <= 1  # the recorder may have come between question and answer
-    assert judge.without_contents == 1
+    assert judge.without_contents > 0
     assert not any(query.legs == "right_middle" for query in found)
     assert all(0.0 < query.seconds < 10.0 for query in found)
     tally = findings.tallies["query_footholds", "left_front"]
@@ -170,7 +180,7 @@ def test_the_summary_says_what_the_planner_was_answered(recorded):
             answer.best, np.max(wanted.load_capacity[wanted.ranking], initial=0.0) or np.nan
         )
     assert hundreds[0] == hundreds[2] != hundreds[1]  # the limits in force count
-    step = by_service["query_step_length"][0].answer
+    step, _ = (q.answer for q in by_service["query_step_length"] if q.legs != "right_front")
     assert (step.points, step.best) == (12, np.max(steps.common_lengths))
 
 
@@ -228,10 +238,10 @@ def test_another_robot_gives_other_answers(recorded):
 def test_half_a_conversation_is_counted(recorded, tmp_path):
     found, judge, _ = judged(changed(tmp_path / "asked", recorded[0], only(1)))
     assert {query.service for query in found} == {"query_step_length"}
-    assert judge.unanswered > 10
+    assert judge.unanswered == 9
     found, judge, _ = judged(changed(tmp_path / "answered", recorded[0], only(2)))
     assert {query.service for query in found} == {"query_step_length"}
-    assert judge.without_request > 10
+    assert judge.without_request == 9
 
 
 def test_requests_without_a_response_do_not_pile_up(recorded, tmp_path, monkeypatch):
@@ -321,7 +331,7 @@ def test_the_command_judges_a_recording_of_queries_alone(recorded, tmp_path, cap
         "Queries that were refused, the first query_footholds of wing at",
         "0 differ.",
         "UNKNOWN_GROUND: unknown ground 'lava'; allowed: ice, wood, cement",
-        "1 requests were recorded without their contents.",
+        "requests were recorded without their contents.",
         "30 REACH",
     ):
         assert text in report
