@@ -79,7 +79,10 @@ class Kernel:
 
 
 def at_real_path(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a function whose linked and installed names share what numba compiles for a path."""
+    """Return the function, known by the real path of its file: numba caches by path.
+
+    Linked and installed names of one file then share what is compiled.
+    """
     path = os.path.realpath(function.__code__.co_filename)
     function.__code__ = function.__code__.replace(co_filename=path)
     return function

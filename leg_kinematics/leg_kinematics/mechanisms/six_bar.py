@@ -175,7 +175,7 @@ def constants_of_geometry(geometry, shape, constants):  # type: ignore[no-untype
 
 @points_kernel("(c),(s),(2),(points,1)->(points,3),(points,s),(points)", "f8 f8 f8 f8 f8 f8 u1")
 def _forward(constants, sides, limits, q, foot, closure, status):  # type: ignore[no-untyped-def]
-    """Crank angles to foot in the leg frame, closure and status; `shape` sets the foot's length."""
+    """Crank angles to foot in the leg frame, closure and status."""
     k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
     mode, bounds = to_fixed_tuple(sides, SIDES_SIZE), to_fixed_tuple(limits, 2)
     block = np.empty((ROWS, BLOCK))
