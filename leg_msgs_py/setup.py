@@ -17,5 +17,5 @@ setup(
     description="Conversions between numpy arrays and leg_msgs, and a client for gait planners.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
-    entry_points={"console_scripts": ["record = leg_msgs_py.record:main"]},
+    entry_points={"console_scripts": ["record = leg_msgs_py.recordings.record:main"]},
 )

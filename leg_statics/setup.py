@@ -19,13 +19,13 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "plot_gantry_example = leg_statics.plot_gantry_example:main",
+            "plot_gantry_example = leg_statics.published.plot_gantry_example:main",
             "designs_node = leg_msgs_py.nodes:designs_node",
-            "judge_bag = leg_statics.judge.judge_bag:main",
+            "judge_bag = leg_statics.recordings.judge_bag:main",
             "maps_node = leg_msgs_py.nodes:maps_node",
-            "plot_index_map = leg_statics.plot_index_map:main",
-            "search_geometry = leg_statics.search.search_geometry:main",
-            "synthesize_six_bar = leg_statics.synthesize_six_bar:main",
+            "plot_index_map = leg_statics.commands.plot_index_map:main",
+            "search_geometry = leg_statics.commands.search_geometry:main",
+            "synthesize_six_bar = leg_statics.commands.synthesize_six_bar:main",
             "statics_node = leg_msgs_py.nodes:statics_node",
         ],
     },

@@ -7,7 +7,7 @@ import sys
 
 from std_srvs.srv import Trigger
 
-from leg_kinematics.robot_node import RobotNode, run
+from leg_kinematics.nodes.robot_node import RobotNode, run
 
 
 class BrokenNode(RobotNode):

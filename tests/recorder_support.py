@@ -9,7 +9,7 @@ from collections import defaultdict
 from contextlib import contextmanager
 from pathlib import Path
 
-from leg_msgs_py.bags import Bag
+from leg_msgs_py.recordings.bags import Bag
 from node_processes import find_executable
 
 SENDER = Path(__file__).with_name("numbered_sender.py")

@@ -9,8 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from leg_msgs_py.bags import Bag
 from leg_msgs_py.client import LegClient
+from leg_msgs_py.recordings.bags import Bag
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, wait_for
 from recorder_support import LEGS, RecordProcess, missing, report_of, sender

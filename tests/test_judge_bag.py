@@ -9,22 +9,22 @@ import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-from leg_msgs_py.bags import Bag, BagWriter, installed_types, offered_qos
-from leg_msgs_py.definitions import message_definition
+from leg_msgs_py.recordings.bags import Bag, BagWriter, installed_types, offered_qos
+from leg_msgs_py.recordings.definitions import message_definition
 from make_golden_bags import JOINT_STATE, TYPES, WRENCH
 from rosbags.highlevel import AnyReader
 
 from leg_kinematics import load_robot
 from leg_kinematics.status import Status
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.indices import condition_number, rated_friction
 from leg_statics.joint_stream import JointStream
-from leg_statics.judge import bag_judge
-from leg_statics.judge import findings as judge_findings
-from leg_statics.judge.bag_judge import BagJudge, Judgement, Topics
-from leg_statics.judge.findings import Findings
-from leg_statics.judge.judge_bag import main
+from leg_statics.recordings import bag_judge
+from leg_statics.recordings import findings as judge_findings
+from leg_statics.recordings.bag_judge import BagJudge, Judgement, Topics
+from leg_statics.recordings.findings import Findings
+from leg_statics.recordings.judge_bag import main
 
 BAGS = Path(__file__).parent / "bags"
 TRIPOD, TROT, FAULTS = BAGS / "hexapod_tripod", BAGS / "quadruped_trot", BAGS / "hexapod_faults"

@@ -17,7 +17,7 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.indices import condition_number, rated_friction
 
 SENDER = Path(__file__).resolve().parent.parent / "benchmarks" / "children" / "sender.py"

@@ -8,9 +8,9 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from leg_msgs_py import errors
-from leg_msgs_py.bags import Bag, BagError, BagWriter
 from leg_msgs_py.client import Ground, LegClient
-from leg_msgs_py.definitions import message_definition
+from leg_msgs_py.recordings.bags import Bag, BagError, BagWriter
+from leg_msgs_py.recordings.definitions import message_definition
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, set_parameter, wait_for
 from recorder_support import RecordProcess
@@ -19,10 +19,10 @@ from leg_kinematics import load_robot
 from leg_kinematics.errors import ValueRangeError
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.grounds import load_grounds
-from leg_statics.judge import query_judge
-from leg_statics.judge.bag_judge import BagJudge, Topics
-from leg_statics.judge.judge_bag import main
-from leg_statics.judge.query_judge import QueryFindings, QueryJudge
+from leg_statics.recordings import query_judge
+from leg_statics.recordings.bag_judge import BagJudge, Topics
+from leg_statics.recordings.judge_bag import main
+from leg_statics.recordings.query_judge import QueryFindings, QueryJudge
 
 NODE = "/planner/statics"
 FOOTHOLDS, STEPS = (f"{NODE}/query_{what}/_service_event" for what in ("footholds", "step_length"))

@@ -10,13 +10,13 @@ from collections import namedtuple
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from leg_msgs.msg import EffortLimits, LegStates
-from leg_msgs_py import durable_bag
-from leg_msgs_py.bags import Bag
 from leg_msgs_py.client import LegClient
-from leg_msgs_py.definitions import UnknownTypeError, message_class, message_definition
-from leg_msgs_py.durable_bag import DurableBag, RecordingError
-from leg_msgs_py.record import main
-from leg_msgs_py.recorder import matching_qos, recorded_qos
+from leg_msgs_py.recordings import durable_bag
+from leg_msgs_py.recordings.bags import Bag
+from leg_msgs_py.recordings.definitions import UnknownTypeError, message_class, message_definition
+from leg_msgs_py.recordings.durable_bag import DurableBag, RecordingError
+from leg_msgs_py.recordings.record import main
+from leg_msgs_py.recordings.recorder import matching_qos, recorded_qos
 from nodes_support import wait_for
 from numbered_sender import WARM_UP_MESSAGES
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -128,7 +128,7 @@ def test_a_disk_that_gets_full_ends_the_recording_which_is_whole(tmp_path, monke
 
 WRITE_TOO_MUCH = """
 import resource, sys, time
-from leg_msgs_py.durable_bag import DurableBag, RecordingError
+from leg_msgs_py.recordings.durable_bag import DurableBag, RecordingError
 resource.setrlimit(resource.RLIMIT_FSIZE, (3_000_000, 3_000_000))
 try:
     with DurableBag(sys.argv[1]) as bag:

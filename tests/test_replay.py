@@ -12,10 +12,10 @@ import rclpy
 from builtin_interfaces.msg import Time
 from leg_msgs.msg import LegState, LegStates
 from leg_msgs_py.arrays import to_field
-from leg_msgs_py.bags import Bag, BagWriter, offered_qos
-from leg_msgs_py.comparison import Tolerance, assert_same, differences, report
-from leg_msgs_py.recorder import spin
-from leg_msgs_py.replay import Replay, ReplayError, read_messages
+from leg_msgs_py.recordings.bags import Bag, BagWriter, offered_qos
+from leg_msgs_py.recordings.comparison import Tolerance, assert_same, differences, report
+from leg_msgs_py.recordings.recorder import spin
+from leg_msgs_py.recordings.replay import Replay, ReplayError, read_messages
 from make_golden_bags import FAULTS, GARBLED
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, wait_for
@@ -30,14 +30,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
 from leg_kinematics import Status, load_robot
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStateError, JointStream
-from leg_statics.judge.bag_judge import BagJudge, Topics
-from leg_statics.judge.judged_bag import JudgedBag
+from leg_statics.recordings.bag_judge import BagJudge, Topics
+from leg_statics.recordings.judged_bag import JudgedBag
 
-pytest_plugins = ["leg_msgs_py.pytest_replay"]
+pytest_plugins = ["leg_msgs_py.recordings.pytest_replay"]
 
 BAGS = Path(__file__).parent / "bags"
 FRICTION = 0.4  # the default of the statics node

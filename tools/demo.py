@@ -236,7 +236,7 @@ def show_refusals(client: LegClient, leg: LegDescription) -> None:
 def draw_maps(client: LegClient, output: Path) -> None:
     """Ask the maps node for planes of one leg's workspace and draw them."""
     # Imported here, while the planner walks: it takes seconds.
-    from leg_statics import plots
+    from leg_statics.drawing import plots
     from leg_statics.maps import CAPACITY_LAYER, IndexMap
 
     def plane(height: float, layer: str, ground: str) -> IndexMap:

@@ -21,8 +21,9 @@ from rich.progress import Progress
 from rich.table import Table
 
 import leg_statics.published
-from leg_statics import plot_gantry_example, plot_index_map, plots, synthesize_six_bar
-from leg_statics.published import paper_000
+from leg_statics.commands import plot_index_map, synthesize_six_bar
+from leg_statics.drawing import plots
+from leg_statics.published import paper_000, plot_gantry_example
 from leg_statics.published.comparison import Comparison
 
 COLUMNS = ("item", "paper", "ours", "difference", "verdict", "note")

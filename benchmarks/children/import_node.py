@@ -6,6 +6,6 @@ START = time.perf_counter()
 
 import json  # noqa: E402
 
-import leg_statics.statics_node  # noqa: E402, F401
+import leg_statics.nodes.statics_node  # noqa: E402, F401
 
 print(json.dumps({"import": time.perf_counter() - START}))

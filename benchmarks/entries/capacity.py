@@ -12,7 +12,7 @@ from peers.solvers import PYRAMID_EXCESS, Clarabel, ForcePolytope, Highs, Linpro
 from workload import BATCH, FRICTION, hexapod_leg, reachable_positions
 
 from leg_kinematics.arrays import FloatArray
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 
 GOALS = {"clarabel": Goal(500.0, at_least=True)}
 NOTES = {

@@ -12,7 +12,7 @@ from harness import Row, Settings, Timing, measure, timed_row
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
 
 from leg_kinematics.mechanism import inverse_with_twist
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.footholds import evaluate_footholds
 
 HERE = Path(__file__).resolve().parent.parent

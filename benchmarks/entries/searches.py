@@ -10,9 +10,9 @@ from pathlib import Path
 from harness import Goal, Row, Settings
 
 from leg_kinematics.documents import Document
-from leg_statics.search.geometry_search import GeometrySearch
-from leg_statics.search.study import study_from_document
-from leg_statics.search.workers import LocalWorkers
+from leg_statics.design.search.geometry_search import GeometrySearch
+from leg_statics.design.search.study import study_from_document
+from leg_statics.design.search.workers import LocalWorkers
 
 PROCESSES = (1, 2)
 STUDY = """\

@@ -8,7 +8,7 @@ from harness import Goal, Row, Settings, measure, timed_row
 from workload import CONTACT, FRICTION, hexapod_leg, reachable_positions
 
 from leg_kinematics.mechanism import inverse_with_twist
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.footholds import evaluate_footholds
 
 GOAL = Goal(10e-6)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
-from leg_kinematics.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 
 
 @scalar

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_kinematics.dyads import (
+from leg_kinematics.mechanisms.dyads import (
     Point,
     crank_pin,
     dyad,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from leg_kinematics.health import ERROR, OK, WARN, Health
+from leg_kinematics.nodes.health import ERROR, OK, WARN, Health
 
 
 def test_a_node_that_does_its_work_is_ok():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import leg_kinematics
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernels.kernel import kernel, scalar
 
 PACKAGES = str(Path(leg_kinematics.__file__).parents[1])
 
@@ -56,11 +56,12 @@ def run(folder: Path, cache: Path) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def program(tmp_path):
     (tmp_path / "helper.py").write_text(
-        "from leg_kinematics.kernel import scalar\n\n@scalar\ndef times(x):\n    return 2.0 * x\n"
+        "from leg_kinematics.kernels.kernel import scalar\n\n"
+        "@scalar\ndef times(x):\n    return 2.0 * x\n"
     )
     (tmp_path / "user.py").write_text(
         textwrap.dedent("""
-        from leg_kinematics.kernel import kernel
+        from leg_kinematics.kernels.kernel import kernel
         from helper import times
 
         @kernel("()->()", "f8, f8[:]")

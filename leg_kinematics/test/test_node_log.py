@@ -7,8 +7,8 @@ import warnings
 
 import pytest
 
-from leg_kinematics import node_log
-from leg_kinematics.node_log import PERIOD, LibraryLog, NodeLog
+from leg_kinematics.nodes import node_log
+from leg_kinematics.nodes.node_log import PERIOD, LibraryLog, NodeLog
 
 
 class Lines:

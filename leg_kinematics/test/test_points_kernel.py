@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from leg_kinematics.points_kernel import points_kernel
+from leg_kinematics.kernels.points_kernel import points_kernel
 
 
 @points_kernel("(n),(points,n),(points)->(points),(points,n)", "f8 f8 f8 f8 f8")

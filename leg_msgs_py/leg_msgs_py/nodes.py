@@ -25,7 +25,7 @@ def start(module: str) -> int:
     return code
 
 
-kinematics_node = partial(start, "leg_kinematics.kinematics_node")
-statics_node = partial(start, "leg_statics.statics_node")
-maps_node = partial(start, "leg_statics.maps_node")
-designs_node = partial(start, "leg_statics.designs_node")
+kinematics_node = partial(start, "leg_kinematics.nodes.kinematics_node")
+statics_node = partial(start, "leg_statics.nodes.statics_node")
+maps_node = partial(start, "leg_statics.nodes.maps_node")
+designs_node = partial(start, "leg_statics.nodes.designs_node")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import ShapeError
-from leg_kinematics.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 
 
 def joint_efforts(

@@ -20,7 +20,8 @@ from leg_kinematics.arrays import (
     common_batch,
     has_code,
 )
-from leg_kinematics.blocks import (
+from leg_kinematics.errors import NotSupportedError, ValueRangeError
+from leg_kinematics.kernels.blocks import (
     BLOCK,
     get3,
     load,
@@ -29,17 +30,16 @@ from leg_kinematics.blocks import (
     put,
     store,
 )
-from leg_kinematics.errors import NotSupportedError, ValueRangeError
-from leg_kinematics.kernel import inlined, scalar
+from leg_kinematics.kernels.kernel import inlined, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_twist
-from leg_kinematics.points_kernel import points_kernel
 from leg_kinematics.status import Status
-from leg_statics.capacity import check_effort_limits, check_normals, difference, unit
+from leg_statics.capacity.planes import plane_capacity
+from leg_statics.capacity.problem import check_effort_limits, check_normals, difference, unit
+from leg_statics.capacity.three_joint import inner, three_joint_capacity
 from leg_statics.efforts import worst_moment_effort
 from leg_statics.indices import force_slopes
 from leg_statics.kinematics import Kinematics
-from leg_statics.plane_capacity import plane_capacity
-from leg_statics.three_joint_capacity import inner, three_joint_capacity
 
 
 class Verdict(IntEnum):

@@ -15,7 +15,7 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.conditioning import condition_number, row_factors
 from leg_kinematics.errors import NotSupportedError, ShapeError, UnknownNameError
-from leg_kinematics.kernel import inlined, kernel
+from leg_kinematics.kernels.kernel import inlined, kernel
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 from leg_statics.efforts import worst_moment_efforts

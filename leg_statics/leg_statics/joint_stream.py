@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from leg_kinematics.arrays import FloatArray, as_array, as_non_negative
 from leg_kinematics.errors import LegError
 from leg_kinematics.robot import Robot
-from leg_statics.capacity import check_effort_limits
+from leg_statics.capacity.problem import check_effort_limits
 from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
 from leg_statics.leg_state import LegStates, leg_states
 

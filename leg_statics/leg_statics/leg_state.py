@@ -12,10 +12,10 @@ import numpy as np
 
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.conditioning import condition_of_point
-from leg_kinematics.kernel import kernel
+from leg_kinematics.kernels.kernel import kernel
 from leg_kinematics.mechanism import forward_with_twist
 from leg_kinematics.status import Status
-from leg_statics.capacity import capacity_of_point
+from leg_statics.capacity.problem import capacity_of_point
 from leg_statics.efforts import utilisation_of_point
 from leg_statics.indices import force_slopes
 from leg_statics.joint_layout import LegGroup

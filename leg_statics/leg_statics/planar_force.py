@@ -13,7 +13,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
-from leg_kinematics.kernel import kernel
+from leg_kinematics.kernels.kernel import kernel
 
 
 class ForceTransmission(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from leg_kinematics.robot import Robot
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from leg_kinematics.errors import ShapeError, ValueRangeError
-from leg_statics.capacity import CapacityStatus, load_capacity
+from leg_statics.capacity.problem import CapacityStatus, load_capacity
 
 BOUNDED, UNBOUNDED, INFEASIBLE, INVALID_INPUT = CapacityStatus
 UP = (0.0, 0.0, 1.0)

@@ -7,7 +7,7 @@ import resource
 import numpy as np
 import pytest
 
-from leg_statics.search.design_table import Design, DesignTable, TableError
+from leg_statics.design.search.design_table import Design, DesignTable, TableError
 
 NAMES = (["a", "b"], ["x"])
 

@@ -11,7 +11,7 @@ import pytest
 from leg_kinematics import ParallelDrive, ShapeError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanisms import MECHANISMS, GantryHybrid, SixBar
 from leg_kinematics.mirrored import Mirrored
-from leg_statics.designs import (
+from leg_statics.design.designs import (
     METRICS,
     Conditions,
     changed_mechanism,

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from leg_kinematics import ParallelDrive, ShapeError, Status, ValueRangeError
 from leg_kinematics.mirrored import Mirrored
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import joint_efforts
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.published.paper_000 import legs

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
 
 JACOBIAN = np.array([[0.3, -0.1, 0.05], [0.02, 0.25, -0.2], [-0.1, 0.05, 0.4]])

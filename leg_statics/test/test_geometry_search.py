@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from leg_kinematics import load_robot
-from leg_statics.designs import evaluate_design
-from leg_statics.search.design_table import Design, TableError
-from leg_statics.search.geometry_search import EvenSample, GeometrySearch, SearchError
-from leg_statics.search.jobs import SearchJob
-from leg_statics.search.report import winner_robot, write_results
-from leg_statics.search.study import load_study
-from leg_statics.search.workers import LocalWorkers, Workers
+from leg_statics.design.designs import evaluate_design
+from leg_statics.design.search.design_table import Design, TableError
+from leg_statics.design.search.geometry_search import EvenSample, GeometrySearch, SearchError
+from leg_statics.design.search.jobs import SearchJob
+from leg_statics.design.search.report import winner_robot, write_results
+from leg_statics.design.search.study import load_study
+from leg_statics.design.search.workers import LocalWorkers, Workers
 
 CHEAP = """\
 version: 1
@@ -275,8 +275,8 @@ def test_memory_stays_flat_as_designs_stream_by(study, tmp_path, monkeypatch):
     def instead(task, designs):
         return [Design(d, np.array([d.sum(), d.prod(), 0.0]), 0.0, "") for d in designs]
 
-    monkeypatch.setattr("leg_statics.search.geometry_search.evaluate_designs", instead)
-    monkeypatch.setattr("leg_statics.search.geometry_search.MOST_SAMPLED", 100)
+    monkeypatch.setattr("leg_statics.design.search.geometry_search.evaluate_designs", instead)
+    monkeypatch.setattr("leg_statics.design.search.geometry_search.MOST_SAMPLED", 100)
     stream = study("{name: nsga2, designs: 96, population: 12}", "{name: samples, designs: 3000}")
     used = []
     tracemalloc.start()

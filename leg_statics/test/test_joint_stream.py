@@ -7,7 +7,7 @@ import pytest
 
 from leg_kinematics import Robot, Status, ValueRangeError, load_robot
 from leg_kinematics.robot import Leg
-from leg_statics.capacity import load_capacity
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStateError, JointStream, StampOrder

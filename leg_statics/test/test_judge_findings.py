@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from leg_kinematics import load_robot
-from leg_statics.judge import findings as judge_findings
-from leg_statics.judge.bag_judge import Judgement
-from leg_statics.judge.diagnostic_log import MOST_STATUSES, DiagnosticLog
-from leg_statics.judge.findings import MOST_MOMENTS, WINDOW, Envelope, Findings
+from leg_statics.recordings import findings as judge_findings
+from leg_statics.recordings.bag_judge import Judgement
+from leg_statics.recordings.diagnostic_log import MOST_STATUSES, DiagnosticLog
+from leg_statics.recordings.findings import MOST_MOMENTS, WINDOW, Envelope, Findings
 
 Status = namedtuple("Status", "name level message values")
 Value = namedtuple("Value", "key value")

@@ -9,7 +9,6 @@ import pytest
 
 from leg_kinematics import Status
 from leg_kinematics.mechanisms.gantry_hybrid import GantryHybrid
-from leg_statics.plot_gantry_example import main
 from leg_statics.published.paper_004 import (
     comparisons,
     drive_motion,
@@ -19,6 +18,7 @@ from leg_statics.published.paper_004 import (
     output_motions,
     printed_forward_acceleration,
 )
+from leg_statics.published.plot_gantry_example import main
 
 TIME = example_times(501)
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_statics.search.pareto import ParetoFront
+from leg_statics.design.search.pareto import ParetoFront
 
 
 def brute_force(costs):

@@ -17,7 +17,8 @@ from matplotlib.text import Text
 from leg_kinematics import ParallelDrive, ShapeError, UnknownNameError
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
 from leg_kinematics.mechanisms import DoubleRhombus, TheoJansen
-from leg_statics import plot_index_map, plots
+from leg_statics.commands import plot_index_map
+from leg_statics.drawing import plots
 from leg_statics.grounds import Ground
 from leg_statics.indices import INDICES, supported_indices
 from leg_statics.maps import plane_map
@@ -305,7 +306,7 @@ def test_labels_are_large_enough_stay_on_the_page_and_do_not_overlap(name):
 
 def test_importing_the_plots_leaves_the_backend_alone():
     code = (
-        "import sys; before = set(sys.modules); import leg_statics.plots; "
+        "import sys; before = set(sys.modules); import leg_statics.drawing.plots; "
         "sys.exit('matplotlib.pyplot' in sys.modules or 'rclpy' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

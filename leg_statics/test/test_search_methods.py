@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from leg_statics.search.methods import INFEASIBLE, METHODS, Draw, Trial, snap
+from leg_statics.design.search.methods import INFEASIBLE, METHODS, Draw, Trial, snap
 
 CONTINUOUS = (None, None)
 

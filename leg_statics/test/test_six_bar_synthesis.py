@@ -11,9 +11,8 @@ import pytest
 from leg_kinematics.errors import GeometryError, ValueRangeError
 from leg_kinematics.gait_curve import gait_curve
 from leg_kinematics.mechanisms.six_bar import SixBar
-from leg_statics import synthesize_six_bar
-from leg_statics.published import paper_003
-from leg_statics.six_bar_synthesis import (
+from leg_statics.commands import synthesize_six_bar
+from leg_statics.design.synthesis import (
     JANSEN,
     Design,
     angle_deviations,
@@ -25,6 +24,7 @@ from leg_statics.six_bar_synthesis import (
     sweep,
     synthesize,
 )
+from leg_statics.published import paper_003
 
 OPTIMUM = synthesize(paper_003.BEST_PHI_MAX)
 

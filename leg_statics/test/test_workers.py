@@ -10,7 +10,7 @@ import time
 import pytest
 
 from leg_kinematics import ValueRangeError
-from leg_statics.search.workers import AHEAD, LocalWorkers, WorkerError, open_workers
+from leg_statics.design.search.workers import AHEAD, LocalWorkers, WorkerError, open_workers
 
 # Worker processes cannot import this module: what they do is told as expressions for `eval`.
 PROCESS = "__import__('os').getpid()"
@@ -68,7 +68,7 @@ def test_processes_that_always_die_end_the_work():
 
 PARENT = """
 import time
-from leg_statics.search.workers import LocalWorkers
+from leg_statics.design.search.workers import LocalWorkers
 if __name__ == "__main__":
     with LocalWorkers(1) as workers:
         print(*workers.map(eval, ["__import__('os').getpid()"]), flush=True)
@@ -170,6 +170,6 @@ def test_a_dask_worker_that_is_killed_costs_no_result_and_a_lost_scheduler_is_to
 
 
 def test_a_scheduler_out_of_reach_is_told(monkeypatch):
-    monkeypatch.setattr("leg_statics.search.workers.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("leg_statics.design.search.workers.CONNECT_TIMEOUT", 0.5)
     with pytest.raises(WorkerError, match=r"scheduler tcp://127\.0\.0\.1:9: not reachable"):
         open_workers(scheduler="tcp://127.0.0.1:9")

@@ -11,10 +11,10 @@ import pytest
 from leg_kinematics import ParallelDrive, ValueRangeError
 from leg_kinematics.mechanisms import GantryHybrid, TheoJansen
 from leg_kinematics.mirrored import Mirrored
+from leg_statics.design.averages import FEWEST_POINTS, average, heights_by_volume
 from leg_statics.global_means import means_on_grid, sample_workspace
 from leg_statics.indices import evaluate_indices
 from leg_statics.published import paper_000
-from leg_statics.workspace_averages import FEWEST_POINTS, average, heights_by_volume
 
 STAGES = paper_000.legs()
 THREE = ["condition_number", "unit_effort_capacity", "unit_moment_effort"]

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
-from leg_kinematics.blocks import load, put, store
-from leg_kinematics.dyads import Point, crank_pin, fixed
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import Kernel, inlined, kernel, scalar
+from leg_kinematics.kernels.blocks import load, put, store
+from leg_kinematics.kernels.kernel import Kernel, inlined, kernel, scalar
+from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE, within
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -33,7 +33,7 @@ from leg_kinematics.mechanism import (
     Posture,
     mode_index,
 )
-from leg_kinematics.scalars import LIMIT_TOLERANCE, within
+from leg_kinematics.mechanisms.dyads import Point, crank_pin, fixed
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)

@@ -43,7 +43,8 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernels.kernel import kernel, scalar
+from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -53,7 +54,6 @@ from leg_kinematics.mechanism import (
     mode_signs,
     parameter,
 )
-from leg_kinematics.scalars import included_angle, swing_plane, within, wrapped
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)

@@ -39,7 +39,8 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import kernel, scalar
+from leg_kinematics.kernels.kernel import kernel, scalar
+from leg_kinematics.kernels.scalars import within, wrapped
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -50,9 +51,8 @@ from leg_kinematics.mechanism import (
     offset,
     parameter,
 )
-from leg_kinematics.scalars import within, wrapped
+from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
 from leg_kinematics.status import Status
-from leg_kinematics.universal_joints import AuxiliaryChain, shaft_state
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
 

@@ -32,9 +32,11 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
-from leg_kinematics.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.blocks import BLOCK, get3, load, put, store, store_columns
+from leg_kinematics.kernels.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.scalars import arctan2, included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import (
     Dimensioned,
     Joint,
@@ -45,8 +47,6 @@ from leg_kinematics.mechanism import (
     offset,
     parameter,
 )
-from leg_kinematics.points_kernel import points_kernel
-from leg_kinematics.scalars import arctan2, included_angle, swing_plane, within, wrapped
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`

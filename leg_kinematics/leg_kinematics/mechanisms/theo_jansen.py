@@ -19,18 +19,9 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.blocks import BLOCK, get3, load
-from leg_kinematics.dyads import (
-    Point,
-    dyad,
-    dyad_coefficients,
-    fixed,
-    rigid_point,
-    transmission,
-    triangle_coefficients,
-    turning_rate,
-)
-from leg_kinematics.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.blocks import BLOCK, get3, load
+from leg_kinematics.kernels.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.mechanism import Joint, flipped_modes, parameter
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
@@ -54,7 +45,16 @@ from leg_kinematics.mechanisms.crank_linkage import (
     store_points,
     turning_pin,
 )
-from leg_kinematics.points_kernel import points_kernel
+from leg_kinematics.mechanisms.dyads import (
+    Point,
+    dyad,
+    dyad_coefficients,
+    fixed,
+    rigid_point,
+    transmission,
+    triangle_coefficients,
+    turning_rate,
+)
 
 
 class Geometry(NamedTuple):

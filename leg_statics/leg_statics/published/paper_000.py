@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from leg_kinematics import GeometryError, ParallelDrive
 from leg_kinematics.arrays import FloatArray
-from leg_statics.designs import STEP_LENGTH, Conditions, Evaluation, evaluate_design
+from leg_statics.design.designs import STEP_LENGTH, Conditions, Evaluation, evaluate_design
+from leg_statics.design.search.workers import LocalWorkers
 from leg_statics.footholds import Contact
 from leg_statics.global_means import means_on_grid
 from leg_statics.indices import INDICES, evaluate_indices
 from leg_statics.published.comparison import Comparison, compare_claim, compare_number
-from leg_statics.search.workers import LocalWorkers
 from leg_statics.step_length import Criterion, longest_step
 
 PAPER = "000"

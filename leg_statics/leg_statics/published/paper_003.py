@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_kinematics.gait_curve import GaitCurve, gait_curve
-from leg_statics.published.comparison import Comparison, compare_claim, compare_number
-from leg_statics.six_bar_synthesis import (
+from leg_statics.design.synthesis import (
     JANSEN,
     Design,
     fit,
@@ -21,6 +20,7 @@ from leg_statics.six_bar_synthesis import (
     sweep,
     synthesize,
 )
+from leg_statics.published.comparison import Comparison, compare_claim, compare_number
 
 PAPER = "003"
 

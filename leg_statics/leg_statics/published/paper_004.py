@@ -14,8 +14,8 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Posture
 from leg_kinematics.mechanisms.gantry_hybrid import GantryHybrid
+from leg_kinematics.mechanisms.universal_joints import OutputMotion
 from leg_kinematics.status import Status
-from leg_kinematics.universal_joints import OutputMotion
 from leg_statics.published.comparison import Comparison, compare_claim
 
 PAPER = "004"

@@ -1,0 +1,1 @@
+"""Compiled mathematics: how scalar code of one point becomes code of many."""

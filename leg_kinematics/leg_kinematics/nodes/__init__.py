@@ -1,0 +1,1 @@
+"""ROS nodes: what they share, and the kinematics node."""

@@ -1,0 +1,511 @@
+"""Studies: what a geometry search varies, wants and may spend, as a checked YAML file.
+
+A file has this form (lengths and angles in the units it states, all else in SI):
+
+    version: 1
+    name: three_lengths
+    units: {length: mm, angle: deg}
+    base: {robot: hexapod, leg_type: initial}      # robot: shipped, or a path from this file
+    parameters:                                    # any of the mechanism's geometry
+      drive_lever: {from: 100, to: 160}            # a continuous range
+      parallelogram_link: {from: 250, to: 350, step: 10}
+      shank_length: {values: [320, 360, 450]}
+    objectives: [condition_number, unit_effort_capacity]   # lower or higher, as each has it
+    constraints:
+      step_length: {min: 300}                      # min, max or both
+    record: [unit_moment_effort]                   # optional: further metrics for the table
+    conditions:                                    # what steps and load capacity are measured under
+      ground: cement                               # the low end of its friction, or a coefficient
+      load: 300                                    # optional: to be borne on all of a step [N]
+      heights: [-700, -650, -600]                  # optional: of the foot, for steps
+      criterion: rated_friction                    # of a step's points; default: capacity
+    method: {name: nsga2, designs: 2000, population: 40}
+    seed: 1                                        # optional, default 0
+    tolerance: 0.005                               # optional: relative error of the means
+
+Effort limits are those of the leg type.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.description import UNITS, find_robot_file, robot_from_document
+from leg_kinematics.documents import NAME, NUMBER, Document, mapping_schema
+from leg_kinematics.errors import LegError, UnknownNameError
+from leg_kinematics.mechanism import SI_UNITS, Mechanism, geometry_parameters
+from leg_kinematics.robot import Leg
+from leg_statics.design.designs import (
+    METRICS,
+    Conditions,
+    Evaluation,
+    evaluate_design,
+    find_metric,
+    missing_condition,
+    supported_metrics,
+)
+from leg_statics.design.search.methods import METHODS, Draw
+from leg_statics.grounds import load_grounds
+from leg_statics.step_length import Criterion
+
+VERSION = 1
+MOST_VALUES = 1_000_000  # of one parameter
+LEAST = {"designs": 1, "population": 8}  # an optimiser needs some variety
+
+SPAN_SCHEMA = mapping_schema({"from": NUMBER, "to": NUMBER}, ["from", "to"])
+STEPS_SCHEMA = mapping_schema(
+    {"from": NUMBER, "to": NUMBER, "step": {**NUMBER, "exclusiveMinimum": 0}},
+    ["from", "to", "step"],
+)
+CONDITIONS_SCHEMA = mapping_schema(
+    {
+        "ground": {
+            "description": "the name of a ground or a friction coefficient >= 0",
+            "oneOf": [NAME, {**NUMBER, "minimum": 0}],
+        },
+        "load": {**NUMBER, "minimum": 0},
+        "heights": {"type": "array", "items": NUMBER, "minItems": 1},
+        "criterion": {"enum": [criterion.name.lower() for criterion in Criterion]},
+    },
+    [],
+)
+VALUES_SCHEMA = mapping_schema(
+    {"values": {"type": "array", "items": NUMBER, "minItems": 1, "uniqueItems": True}}, ["values"]
+)
+LIMITS_SCHEMA = {**mapping_schema({"min": NUMBER, "max": NUMBER}, []), "minProperties": 1}
+NAMES_SCHEMA = {"type": "array", "items": NAME, "uniqueItems": True}
+METHOD_SCHEMAS = {
+    name: mapping_schema(
+        {
+            "name": {"const": name},
+            **{key: {"type": "integer", "minimum": LEAST[key]} for key in method.keys},
+        },
+        ["name", *method.keys],
+    )
+    for name, method in METHODS.items()
+}
+STUDY_SCHEMA = mapping_schema(
+    {
+        "version": {"const": VERSION},
+        "name": NAME,
+        "units": mapping_schema(
+            {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
+        ),
+        "base": mapping_schema({"robot": {"type": "string"}, "leg_type": NAME}, ["leg_type"]),
+        "parameters": {"type": "object", "minProperties": 1, "propertyNames": NAME},
+        "objectives": {**NAMES_SCHEMA, "minItems": 1},
+        "constraints": {
+            "type": "object",
+            "propertyNames": NAME,
+            "additionalProperties": LIMITS_SCHEMA,
+        },
+        "record": NAMES_SCHEMA,
+        "conditions": CONDITIONS_SCHEMA,
+        "method": {
+            "type": "object",
+            "properties": {"name": {"enum": list(METHODS)}},
+            "required": ["name"],
+        },
+        "seed": {"type": "integer", "minimum": 0},
+        "tolerance": {**NUMBER, "exclusiveMinimum": 0, "exclusiveMaximum": 1},
+    },
+    ["version", "name", "units", "base", "parameters", "objectives", "method"],
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A dimension that a study varies.
+
+    Attributes:
+        name: Name in the mechanism's geometry.
+        symbol: The literature's symbol.
+        unit: SI unit.
+        lower: Least value [SI].
+        upper: Greatest value [SI].
+        values: The values it may have [SI]; none for all of the range.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    lower: float
+    upper: float
+    values: tuple[float, ...] = ()
+
+    def at(self, share: float) -> float:
+        """Return the value at a share of the range, or of the values: 0 to 1."""
+        if self.values:
+            return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+        return self.lower + share * (self.upper - self.lower)
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """Limits of a metric.
+
+    Attributes:
+        metric: Name of the metric.
+        lower: Least value allowed [SI].
+        upper: Greatest value allowed [SI].
+    """
+
+    metric: str
+    lower: float = -math.inf
+    upper: float = math.inf
+
+    def violation(self, value: float) -> float:
+        """By how much a value is beyond a limit, as a share of the limit unless that is zero."""
+        if math.isnan(value):
+            return math.inf
+        if value < self.lower:
+            return (self.lower - value) / (abs(self.lower) or 1.0)
+        if value > self.upper:
+            return (value - self.upper) / (abs(self.upper) or 1.0)
+        return 0.0
+
+    def complaint(self, value: float) -> str:
+        """Say what is wrong with a value; "" if nothing is."""
+        if value < self.lower:
+            return f"{self.metric} {value:.6g} < {self.lower:.6g}"
+        if value > self.upper:
+            return f"{self.metric} {value:.6g} > {self.upper:.6g}"
+        return ""
+
+
+class DesignTask(NamedTuple):
+    """What it takes to evaluate designs, without the rest of their study.
+
+    Attributes:
+        base: The mechanism whose other dimensions the designs have.
+        parameters: Names of the dimensions that differ.
+        metrics: Names of the metrics.
+        conditions: What they are measured under.
+    """
+
+    base: Mechanism
+    parameters: tuple[str, ...]
+    metrics: tuple[str, ...]
+    conditions: Conditions
+
+    def evaluate(self, values: Iterable[float]) -> Evaluation:
+        """Evaluate the design with these dimensions [SI]."""
+        changes = dict(zip(self.parameters, map(float, values), strict=True))
+        return evaluate_design(self.base, changes, self.metrics, self.conditions)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What to vary, what to want, what to spend.
+
+    Attributes:
+        document: The study file.
+        robot: Description of the robot whose leg is to be improved.
+        leg: The leg as it is now; its mechanism is the base of all designs.
+        parameters: The dimensions that vary (P).
+        objectives: Metrics to make lower or higher, as each has it (K).
+        constraints: Limits that a feasible design keeps.
+        record: Further metrics.
+        conditions: What metrics are measured under.
+        method: Name of the search method.
+        draw: What the method has to go by.
+    """
+
+    document: Document
+    robot: Document
+    leg: Leg
+    parameters: tuple[Parameter, ...]
+    objectives: tuple[str, ...]
+    constraints: tuple[Constraint, ...]
+    record: tuple[str, ...]
+    conditions: Conditions
+    method: str
+    draw: Draw
+
+    @property
+    def name(self) -> str:
+        """Name of the study."""
+        return str(self.document.root["name"])
+
+    @cached_property
+    def metrics(self) -> tuple[str, ...]:
+        """All metrics of a design: objectives first, then constrained and recorded ones."""
+        constrained = (constraint.metric for constraint in self.constraints)
+        return tuple(dict.fromkeys((*self.objectives, *constrained, *self.record)))
+
+    @property
+    def total(self) -> int:
+        """Number of designs that the search evaluates, if it does not run out of new ones."""
+        return self.draw.generations * self.draw.population
+
+    def parameters_at(self, point: FloatArray) -> FloatArray:
+        """Return the dimensions (P,) [SI] at a point of the unit cube (P,)."""
+        return np.array([p.at(x) for p, x in zip(self.parameters, point, strict=True)])
+
+    def changes(self, values: Iterable[float]) -> dict[str, float]:
+        """Return dimensions by name [SI]."""
+        return {p.name: float(x) for p, x in zip(self.parameters, values, strict=True)}
+
+    @property
+    def task(self) -> DesignTask:
+        """What a worker needs to evaluate designs."""
+        names = tuple(parameter.name for parameter in self.parameters)
+        return DesignTask(self.leg.mechanism, names, self.metrics, self.conditions)
+
+    def costs(self, values: FloatArray) -> FloatArray:
+        """Return the objectives (..., K) among the metrics' values as costs: less is better."""
+        return self.signs * values[..., : len(self.objectives)]
+
+    def score(self, values: FloatArray, base: FloatArray) -> float:
+        """Return how much better than the base a design is, as one number: equation (33).
+
+        The product of the relative gains in all objectives if every one of them is better than the
+        base's; else the worst gain, which is not positive. So any design that is better in
+        everything comes before any that is not, and one objective gives its own order.
+        """
+        reference = self.costs(base)
+        gains = (reference - self.costs(values)) / np.where(reference, np.abs(reference), 1.0)
+        return float(np.prod(gains) if np.all(gains > 0.0) else np.min(gains))
+
+    def violation(self, values: FloatArray) -> float:
+        """By how much the metrics' values violate the constraints, 0 if they keep them."""
+        return sum(c.violation(self._value(values, c.metric)) for c in self.constraints)
+
+    def complaint(self, values: FloatArray) -> str:
+        """Say which constraints are violated; "" if none is."""
+        complaints = (c.complaint(self._value(values, c.metric)) for c in self.constraints)
+        return "; ".join(filter(None, complaints))
+
+    @cached_property
+    def signs(self) -> FloatArray:
+        """1 for each objective that is better low, -1 for each that is better high (K,)."""
+        better = (find_metric(name).better for name in self.objectives)
+        return np.array([1.0 if b == "low" else -1.0 for b in better])
+
+    def _value(self, values: FloatArray, metric: str) -> float:
+        return float(values[self.metrics.index(metric)])
+
+
+def load_study(path: str | os.PathLike[str]) -> Study:
+    """Load a study file.
+
+    Raises:
+        DescriptionError: If anything in it is wrong; the message names file, line, key, the value
+            and what is allowed.
+    """
+    return study_from_document(Document(Path(path).expanduser()))
+
+
+def study_from_document(document: Document, robot: str = "") -> Study:
+    """Build a study from a parsed file.
+
+    Args:
+        document: The file.
+        robot: Robot of a study that names none; "" if it must.
+
+    Raises:
+        DescriptionError: If anything in it is wrong.
+    """
+    _check_version(document)
+    document.check(STUDY_SCHEMA)
+    root = document.root
+    document.check(METHOD_SCHEMAS[root["method"]["name"]], "method")
+    units = {k: UNITS[k][v] for k, v in root["units"].items()} | {"ratio": 1.0}
+    robot_document, leg = _load_base(document, robot)
+    parameters = tuple(
+        _parameter(document, name, leg.geometry, units) for name in root["parameters"]
+    )
+    study = Study(
+        document=document,
+        robot=robot_document,
+        leg=leg,
+        parameters=parameters,
+        objectives=tuple(root["objectives"]),
+        constraints=tuple(
+            _constraint(document, name, units) for name in root.get("constraints", {})
+        ),
+        record=tuple(root.get("record", [])),
+        conditions=_conditions(document, leg, units),
+        method=str(root["method"]["name"]),
+        draw=_draw(document, parameters),
+    )
+    _check_metrics(study)
+    return study
+
+
+def _check_version(document: Document) -> None:
+    root = document.root
+    if isinstance(root, Mapping) and root.get("version", VERSION) != VERSION:
+        raise document.error(
+            f"{root['version']!r}: this program reads version {VERSION}", "version"
+        )
+
+
+def _load_base(document: Document, robot: str) -> tuple[Document, Leg]:
+    """Return the robot's description and a leg of the type to be improved."""
+    base = document.root["base"]
+    source = str(base.get("robot", robot))
+    if not source:
+        raise document.error("missing key 'robot'", "base")
+    beside = document.path.parent / source
+    try:
+        path = beside if beside.is_file() else find_robot_file(source)
+        description = Document(path)
+        robot_from_document(description)
+        if base["leg_type"] not in description.root["leg_types"]:
+            raise UnknownNameError("leg type", base["leg_type"], description.root["leg_types"])
+    except UnknownNameError as error:
+        raise document.error(str(error), "base", "leg_type") from None
+    except LegError as error:
+        raise document.error(str(error), "base", "robot") from None
+    alone = Document(path, description.text)
+    mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}
+    alone.root["legs"] = {"leg": {"type": base["leg_type"], "mount": mount}}
+    return description, robot_from_document(alone).leg("leg")
+
+
+def _parameter(
+    document: Document, name: str, mechanism: Any, units: Mapping[str, float]
+) -> Parameter:
+    where = ("parameters", name)
+    fields = {f.name: f for f in geometry_parameters(mechanism)}
+    if name not in fields:
+        raise document.error(_unknown("parameter", name, list(fields)), *where)
+    entry = document.node(*where)
+    keys = entry if isinstance(entry, Mapping) else {}
+    schema = VALUES_SCHEMA if "values" in keys else STEPS_SCHEMA if "step" in keys else SPAN_SCHEMA
+    document.check(schema, *where)
+    metadata = fields[name].metadata
+    scale = units[metadata["dimension"]]
+    if "values" in keys:
+        values = tuple(float(value) * scale for value in entry["values"])
+    else:
+        values = _steps(document, entry, scale, *where)
+    lower, upper = (
+        (min(values), max(values)) if values else (entry["from"] * scale, entry["to"] * scale)
+    )
+    if metadata["positive"] and lower <= 0.0:
+        raise document.error(f"{lower / scale:g}: the least value must be > 0", *where)
+    return Parameter(
+        name,
+        metadata["symbol"],
+        SI_UNITS[metadata["dimension"]],
+        float(lower),
+        float(upper),
+        values,
+    )
+
+
+def _steps(
+    document: Document, entry: Mapping[str, float], scale: float, *where: str
+) -> tuple[float, ...]:
+    """Return the values of a range with a step; none for a continuous range."""
+    lower, upper = entry["from"], entry["to"]
+    if not lower < upper:
+        raise document.error(f"{upper!r}: must be > from = {lower!r}", *where, "to")
+    if "step" not in entry:
+        return ()
+    step = entry["step"]
+    count = (upper - lower) / step
+    if not count < MOST_VALUES:
+        raise document.error(
+            f"{step!r}: makes {count:.3g} values; allowed: {MOST_VALUES}", *where, "step"
+        )
+    if abs(count - round(count)) > 1e-6:
+        raise document.error(
+            f"{step!r}: from = {lower!r} to = {upper!r} is no whole number of steps",
+            *where,
+            "step",
+        )
+    # like linspace, so that the ends are exact
+    return tuple(np.linspace(lower * scale, upper * scale, round(count) + 1).tolist())
+
+
+def _constraint(document: Document, name: str, units: Mapping[str, float]) -> Constraint:
+    where = ("constraints", name)
+    limits = document.node(*where)
+    unit = METRICS[name].unit if name in METRICS else "1"  # unknown ones are told with the others
+    scale = units["length"] if unit == "m" else 1.0
+    lower, upper = limits.get("min", -math.inf), limits.get("max", math.inf)
+    if lower > upper:
+        raise document.error(f"{upper!r}: must be >= min = {lower!r}", *where, "max")
+    return Constraint(name, float(lower) * scale, float(upper) * scale)
+
+
+def _conditions(document: Document, leg: Leg, units: Mapping[str, float]) -> Conditions:
+    entry = document.root.get("conditions", {})
+    ground = entry.get("ground")
+    if isinstance(ground, str):
+        try:
+            ground = load_grounds().find(ground).friction_low
+        except UnknownNameError as error:
+            raise document.error(str(error), "conditions", "ground") from None
+    return Conditions(
+        friction=None if ground is None else float(ground),
+        load=float(entry.get("load", 0.0)),
+        heights=tuple(float(height) * units["length"] for height in entry.get("heights", [])),
+        effort_limits=tuple(map(tuple, leg.effort_limits.tolist())),
+        criterion=Criterion[entry.get("criterion", Criterion.CAPACITY.name).upper()],
+        tolerance=float(document.root.get("tolerance", 0.005)),
+    )
+
+
+def _check_metrics(study: Study) -> None:
+    """Raise if a metric does not exist, or cannot be evaluated for this leg."""
+    places: list[tuple[str, Any, str]] = [
+        *(("objectives", k, name) for k, name in enumerate(study.objectives)),
+        *(("constraints", c.metric, c.metric) for c in study.constraints),
+        *(("record", k, name) for k, name in enumerate(study.record)),
+    ]
+    for *where, name in places:
+        if name not in METRICS:
+            raise study.document.error(_unknown("metric", name, list(METRICS)), *where)
+        mechanism = study.leg.mechanism
+        if name not in supported_metrics(mechanism):
+            raise study.document.error(
+                f"mechanism {mechanism.name!r} has no {name}; it has: "
+                f"{', '.join(supported_metrics(mechanism))}",
+                *where,
+            )
+        if missing_condition(name, study.conditions):
+            raise study.document.error(f"{name!r} needs conditions.ground", *where)
+
+
+def _unknown(kind: str, name: str, allowed: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, allowed, 1)
+    guess = f"; did you mean {close[0]!r}?" if close else ""
+    return f"{UnknownNameError(kind, name, allowed)}{guess}"
+
+
+def _draw(document: Document, parameters: Sequence[Parameter]) -> Draw:
+    root = document.root
+    method = root["method"]
+    cells = tuple(len(p.values) or None for p in parameters)
+    designs = method.get("designs", 0)
+    if method["name"] == "grid":
+        for parameter, count in zip(parameters, cells, strict=True):
+            if count is None:
+                raise document.error(
+                    "a grid needs a step or values for every parameter",
+                    "parameters",
+                    parameter.name,
+                )
+        designs = math.prod(count for count in cells if count)
+    population = method.get("population", 1)
+    if designs < population:
+        raise document.error(
+            f"{designs}: must be >= population = {population}", "method", "designs"
+        )
+    return Draw(
+        cells, len(root["objectives"]), int(designs), int(population), int(root.get("seed", 0))
+    )

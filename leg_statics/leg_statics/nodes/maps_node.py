@@ -1,0 +1,328 @@
+"""The maps node: index maps of the legs of one robot, and markers that show the legs.
+
+It is a process of its own, so that a map never delays the answer to a query.
+"""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from leg_msgs.action import ComputeIndexMap
+from leg_msgs.msg import EffortLimits
+from leg_msgs.srv import GetIndexMap
+from leg_msgs_py.arrays import from_field, to_field
+from leg_msgs_py.clouds import to_cloud
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState, PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
+from leg_kinematics.mechanism import Posture
+from leg_kinematics.nodes.requests import (
+    POINT_FOOT,
+    LegFrame,
+    RequestError,
+    check_count,
+    find_frame,
+)
+from leg_kinematics.nodes.robot_node import RobotNode, run
+from leg_kinematics.robot import Leg, Robot
+from leg_kinematics.status import Status
+from leg_statics.footholds import Contact
+from leg_statics.map_jobs import MapJob, MapKey, MapMemory
+from leg_statics.maps import IndexMap, find_layer, grid_shape, supported_layers
+from leg_statics.nodes.contacts import declare_grounds, read_ground
+from leg_statics.nodes.goal_queue import GoalQueue
+from leg_statics.nodes.markers import (
+    Scene,
+    grid_points,
+    moving_markers,
+    no_workspace_marker,
+    workspace_marker,
+)
+from leg_statics.warm_up import warm_up_statics
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass(frozen=True)
+class _MapWork:
+    """A map of a whole workspace that a goal has ordered."""
+
+    node: MapsNode
+    leg: Leg
+    frame: LegFrame
+    frame_id: str
+    job: MapJob
+
+    def feedback(self) -> Any:
+        """Return how far the map is."""
+        progress = self.job.progress
+        positions: FloatArray = self.frame.points_from_leg(progress.best_positions)
+        return ComputeIndexMap.Feedback(
+            fraction=progress.fraction,
+            elapsed=progress.elapsed,
+            remaining=progress.remaining,
+            layers=list(progress.layers),
+            best=to_field(progress.best),
+            best_positions=to_field(positions),
+        )
+
+    def result(self) -> Any:
+        """Return the map, or what there is of it."""
+        progress, index_map = self.job.progress, self.job.index_map
+        if self.job.complete and index_map is not None:
+            self.node.publish_map(self.leg, index_map)
+        result = ComputeIndexMap.Result(
+            fraction=progress.fraction,
+            elapsed=progress.elapsed,
+            layers=list(progress.layers),
+            units=[find_layer(name).unit for name in progress.layers],
+            cloud=self.node.cloud(self.frame_id, self.frame, index_map),
+        )
+        if not self.job.complete:
+            result.error.message = (
+                f"cancelled by the caller after {100.0 * progress.fraction:.0f} % of the map"
+            )
+        return result
+
+
+class MapsNode(RobotNode):
+    """Serves index maps of planes and of whole workspaces, and publishes maps and markers."""
+
+    def __init__(self) -> None:
+        super().__init__("maps")
+        self._declare_parameters()
+        self._grounds = declare_grounds(self)
+        self._memory = MapMemory(int(1e6 * self.value("map_memory")))
+        self._limits: Any = None
+        self._postures: dict[str, Posture] = {}
+        self._workspaces: list[Any] = []
+        self._drawn_at = -np.inf
+        self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
+        self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
+        self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
+        self.listen(JointState, "joint_states", self.joint_states)
+        self.add_post_set_parameters_callback(lambda parameters: self._draw())
+        self.robot_changed()
+        self._queue = GoalQueue(
+            self, ComputeIndexMap, "compute_index_map", "maps", self._begin, self._failure
+        )
+        self.serve(GetIndexMap, "get_index_map", self.get_index_map)
+        self.announce()
+
+    def _declare_parameters(self) -> None:
+        self.declare_number(
+            "friction_coefficient",
+            0.4,  # the low end of cement
+            "Friction coefficient of the ground in ~/markers.",
+            (0.0, 10.0),
+        )
+        self.declare(
+            "marker_layer",
+            "load_capacity",
+            "Layer that colours the slice of the workspace in ~/markers; '' = no slice.",
+        )
+        self.declare_number(
+            "marker_resolution", 0.03, "Grid spacing of that slice [m].", (0.005, 1.0)
+        )
+        self.declare_number("marker_rate", 10.0, "Greatest rate of ~/markers [Hz].", (0.1, 100.0))
+        self.declare_number(
+            "marker_force_scale", 1e-4, "Length of a force in ~/markers [m/N].", (1e-9, 1.0)
+        )
+        self.declare_number(
+            "map_memory", 200.0, "Memory for maps computed before [MB].", (0.0, 1e5), read_only=True
+        )
+
+    def destroy_node(self) -> None:
+        """End the map under way, then destroy the node."""
+        self._queue.destroy()
+        super().destroy_node()
+
+    def warm_up(self, robot: Robot) -> None:
+        """Call the kernels of the maps once, too."""
+        super().warm_up(robot)
+        warm_up_statics(robot)
+
+    def robot_changed(self) -> None:
+        """Begin anew: all legs in their initial posture, with the limits in force."""
+        self._postures = {leg.name: leg.mechanism.initial_posture for leg in self._legs()}
+        self._apply_limits()
+        self._draw()
+
+    def _legs(self) -> list[Leg]:
+        return list(self.robot.legs.values())
+
+    # ------------------------------------------------------------------ effort limits
+
+    def effort_limits(self, message: Any) -> None:
+        """Take up the effort limits in force."""
+        self._limits = message
+        self._attend("effort_limits", self._take_up_limits)
+
+    def _take_up_limits(self) -> None:
+        self._apply_limits()
+        self._draw()
+
+    def _apply_limits(self) -> None:
+        """Give the legs the limits last heard of, if they are those of this robot."""
+        message = self._limits
+        if message is None or not set(message.joint_names) >= set(self.robot.effort_limits()[0]):
+            return
+        rows = np.stack([from_field(message.lower), from_field(message.upper)], axis=-1)
+        limits = dict(zip(message.joint_names, rows, strict=True))
+        legs = {
+            leg.name: replace(
+                leg, effort_limits=np.array([limits[joint] for joint in leg.joint_names])
+            )
+            for leg in self._legs()
+        }
+        self.robot = replace(self.robot, legs=legs)
+
+    # ------------------------------------------------------------------ maps
+
+    def get_index_map(self, request: Any, response: Any) -> None:
+        """Fill the map of a plane."""
+        leg = self.robot.leg(request.leg)
+        key = self._key(leg, request, LegFrame(), request.height)
+        plane = self._memory.plane(key)
+        response.header = self.header(leg.frame)
+        response.ny, response.nx = plane.status.shape[1:]
+        response.x0, response.y0 = float(plane.x[0]), float(plane.y[0])
+        response.height, response.resolution = request.height, request.resolution
+        response.layers = list(plane.layers)
+        response.symbols = [find_layer(name).symbol for name in plane.layers]
+        response.units = [find_layer(name).unit for name in plane.layers]
+        response.values = to_field(plane.values)
+        response.status = to_field(plane.status, np.uint8)
+        self.publish_map(leg, plane)
+
+    def _key(self, leg: Leg, request: Any, frame: LegFrame, height: float | None) -> MapKey:
+        """Return the key of the map that a request asks for.
+
+        Raises:
+            LegError: If it cannot be computed.
+        """
+        if leg.mechanism.task_coordinates != POINT_FOOT:
+            raise NotSupportedError(f"leg: {leg.name!r} has no point foot with x, y, z")
+        nz, ny, nx = grid_shape(leg.mechanism, request.resolution)
+        count = ny * nx * (1 if height is not None else nz)
+        check_count("resolution", count, self.value("max_points"))
+        contact = read_ground(self._grounds, request.ground, frame)
+        return MapKey.of(
+            leg.mechanism,
+            height,
+            request.resolution,
+            tuple(request.layers),
+            leg.effort_limits,
+            contact,
+        )
+
+    def cloud(self, frame_id: str, frame: LegFrame, index_map: IndexMap | None) -> Any:
+        """Return the points of a map within the workspace as a cloud."""
+        if index_map is None:
+            return to_cloud(self.header(frame_id), np.empty((0, 3)), {})
+        inside = index_map.status == Status.OK
+        values = index_map.values[inside]
+        columns = {name: values[:, k] for k, name in enumerate(index_map.layers)}
+        points = frame.points_from_leg(grid_points(index_map)[inside])
+        return to_cloud(self.header(frame_id), points, columns)
+
+    def publish_map(self, leg: Leg, index_map: IndexMap) -> None:
+        """Publish a map in the base frame."""
+        base = self.robot.base_frame
+        self._map_publisher.publish(self.cloud(base, find_frame(self.robot, leg, base), index_map))
+
+    # ------------------------------------------------------------------ the action
+
+    def _begin(self, request: Any, pool: ThreadPoolExecutor) -> _MapWork:
+        """Order the map of a goal.
+
+        Raises:
+            LegError: If it cannot be computed.
+        """
+        leg = self.robot.leg(request.leg)
+        frame = find_frame(self.robot, leg, request.header.frame_id)
+        key = self._key(leg, request, frame, None)
+        unknown = set(request.layers) - set(supported_layers(leg.mechanism))
+        if unknown:
+            raise UnknownNameError("layer", unknown.pop(), supported_layers(leg.mechanism))
+        job = MapJob(key, self._memory, pool)
+        return _MapWork(self, leg, frame, request.header.frame_id or leg.frame, job)
+
+    # ------------------------------------------------------------------ markers
+
+    def joint_states(self, message: Any) -> None:
+        """Draw the legs whose joints are in the message, if somebody looks."""
+        now = time.monotonic()
+        if now - self._drawn_at < 1.0 / self.value("marker_rate"):
+            return
+        if not self._marker_publisher.get_subscription_count():
+            return
+        if len(message.position) != len(message.name):
+            raise RequestError(
+                f"position: got {len(message.position)} values; allowed: {len(message.name)}, one "
+                "a name"
+            )
+        positions = dict(zip(message.name, message.position, strict=True))
+        for leg in self._legs():
+            if all(joint in positions for joint in leg.joint_names):
+                joints = [positions[joint] for joint in leg.joint_names]
+                self._postures[leg.name] = leg.mechanism.forward(joints)
+        self._publish_markers()
+
+    def _draw(self) -> None:
+        """Draw everything anew."""
+        self._workspaces = [self._workspace(leg) for leg in self._legs()]
+        self._publish_markers()
+
+    def _workspace(self, leg: Leg) -> Any:
+        """Return the marker of a leg's workspace at the height of its initial foot position."""
+        header, layer = self.header(self.robot.base_frame), self.value("marker_layer")
+        note = f"no workspace drawn: {leg.name}"
+        self.health.notes.pop(note, None)
+        if not layer or leg.mechanism.task_coordinates != POINT_FOOT:
+            return no_workspace_marker(header, leg)
+        try:
+            key = MapKey.of(
+                leg.mechanism,
+                float(leg.mechanism.initial_posture.foot_position[2]),
+                self.value("marker_resolution"),
+                (layer,),
+                leg.effort_limits,
+                Contact(self.value("friction_coefficient")),
+            )
+            return workspace_marker(header, leg, self._memory.plane(key), layer)
+        except LegError as error:
+            self.health.notes[note] = f"parameter marker_layer: {error}"
+            return no_workspace_marker(header, leg)
+
+    def _publish_markers(self) -> None:
+        header = self.header(self.robot.base_frame)
+        friction, scale = self.value("friction_coefficient"), self.value("marker_force_scale")
+        scenes = [
+            Scene(leg, self._postures[leg.name], friction, scale)
+            for leg in self._legs()
+            if leg.name in self._postures
+        ]
+        moving = [marker for scene in scenes for marker in moving_markers(header, scene)]
+        self._marker_publisher.publish(MarkerArray(markers=[*moving, *self._workspaces]))
+        self._drawn_at = time.monotonic()
+
+    def _attend(self, source: str, work: Any) -> None:
+        """Do the work of a callback; a fault of it is recorded."""
+        with self.health.timed():
+            try:
+                work()
+            except Exception as error:
+                self._failure(source, error)
+
+
+def main() -> int:
+    """Run the node."""
+    return run(MapsNode)
