@@ -1,14 +1,18 @@
-"""What all tests share: a ROS network of their own, and no deadline for what numba compiles."""
+"""What all tests share: a ROS domain of their own, and the same random inputs in every run."""
 
 import importlib
 import os
 import sys
+from pathlib import Path
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-# Domains 1 to 101 use no port that the system gives to others; parallel runs and workers differ.
-os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 101))
-os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+sys.path.insert(0, str(Path(__file__).resolve().parent / "tools"))
+
+import ros_domain
+
+# Of every worker of pytest-xdist, too, which inherits the environment of its parent.
+ros_domain.use_own_domain()
 os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 # Import mode `importlib` makes a namespace package of a folder such as leg_kinematics/ that holds
@@ -16,6 +20,9 @@ os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 for package in ("leg_kinematics", "leg_msgs_py", "leg_statics"):
     importlib.import_module(package)
 
-# A verdict on a commit must not depend on luck: elsewhere every run tries other inputs.
-settings.register_profile("workspace", deadline=None, derandomize="CI" in os.environ)
+# A verdict must depend neither on luck nor on the pace of the machine, and numba compiles within an
+# example. `--hypothesis-profile explore` tries other inputs in every run.
+PATIENT = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("workspace", derandomize=True, **PATIENT)
+settings.register_profile("explore", **PATIENT)
 settings.load_profile("workspace")

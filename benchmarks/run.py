@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 
-# One thread unless an entry says otherwise, and a network of this run's own: before anything loads
-# a numeric library or ROS.
+# One thread unless an entry says otherwise, before anything loads a numeric library.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 import argparse  # noqa: E402
 import importlib  # noqa: E402
@@ -26,6 +23,10 @@ from rich.markup import escape  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(1, str(HERE.parent / "tools"))
+
+import ros_domain  # noqa: E402
+
+ros_domain.use_own_domain()  # before anything loads ROS
 
 from harness import Row, Settings, measure, timed_row  # noqa: E402
 from report import describe_machine, results_table, row_record  # noqa: E402

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -16,10 +15,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-# A domain and this machine only, so that the demo meets no robot; set before ROS is loaded.
-DOMAIN_ID = str(1 + os.getpid() % 100)  # above 101 the ports are also handed out to others
-os.environ["ROS_DOMAIN_ID"] = DOMAIN_ID
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+import ros_domain
+
+DOMAIN_ID = ros_domain.use_own_domain()  # so that the demo meets no robot; before ROS is loaded
 
 import numpy as np  # noqa: E402
 from leg_msgs.msg import FootholdVerdict  # noqa: E402
@@ -32,7 +30,7 @@ from rich.console import Console  # noqa: E402
 from rich.markup import escape  # noqa: E402
 from rich.table import Table  # noqa: E402
 
-START_TIMEOUT = 180.0  # the first start on a machine compiles [s]
+START_TIMEOUT = 600.0  # the first start on a machine compiles [s]
 WALK_TIMEOUT = 120.0  # s
 WALKER = Path(__file__).resolve().parent.parent / "examples" / "04_walk_over_terrain.py"
 DISTANCE = 3.0  # of the walk [m]
