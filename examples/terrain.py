@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.documents import NAME, NUMBER, PAIR, Document, mapping_schema, named_schema
-from leg_kinematics.errors import DescriptionError
+from leg_kinematics.files import existing_path
 from leg_statics.grounds import Grounds, load_grounds
 
 GROUND = {"height": NUMBER, "ground": NAME}
@@ -104,10 +103,7 @@ def load_terrain(source: str | os.PathLike[str], grounds: Grounds | None = None)
     Raises:
         DescriptionError: If the file is missing or wrong, with file, line, key and what is allowed.
     """
-    path = Path(source).expanduser()
-    if not path.is_file():
-        raise DescriptionError(f"terrain file {path} does not exist")
-    document = Document(path)
+    document = Document(existing_path("terrain file", source))
     document.check(SCHEMA)
     known = (grounds or load_grounds()).by_name
     everywhere = {"x": (-np.inf, np.inf), "y": (-np.inf, np.inf)}

@@ -43,10 +43,13 @@ from leg_kinematics.documents import (
     shared_files,
 )
 from leg_kinematics.errors import DescriptionError, GeometryError, NotSupportedError
+from leg_kinematics.files import existing_path, exists, user_path
 from leg_kinematics.mechanism import Joint, geometry_parameters
 from leg_kinematics.mechanisms import MECHANISMS
 from leg_kinematics.mirrored import Mirrored
 from leg_kinematics.robot import Leg, Mount, Robot
+
+MOST_LEGS = 64  # and leg types
 
 UNITS = {
     "length": {"m": 1.0, "cm": 0.01, "mm": 0.001},
@@ -71,7 +74,8 @@ ROBOT_SCHEMA = mapping_schema(
                 "type": "object",
                 "properties": {"mechanism": {"enum": list(MECHANISMS)}},
                 "required": ["mechanism"],
-            }
+            },
+            MOST_LEGS,
         ),
         "legs": named_schema(
             mapping_schema(
@@ -85,7 +89,8 @@ ROBOT_SCHEMA = mapping_schema(
                     "joint_names": {"type": "object"},
                 },
                 ["type", "mount"],
-            )
+            ),
+            MOST_LEGS,
         ),
     },
     ["name", "base_frame", "units", "leg_types", "legs"],
@@ -131,11 +136,9 @@ def find_robot_file(source: str | os.PathLike[str]) -> Path:
     Raises:
         DescriptionError: If there is no such file; the message lists the shipped robots.
     """
-    path = Path(source).expanduser()
-    if path.suffix in (".yaml", ".yml") or path.is_file():
-        if not path.is_file():
-            raise DescriptionError(f"robot description {path} does not exist")
-        return path
+    path = user_path(source)
+    if path.suffix in (".yaml", ".yml") or exists(path):
+        return existing_path("robot description", path)
     shipped = shared_files("leg_bringup", "robots", ".yaml")
     if str(source) not in shipped:
         raise DescriptionError(

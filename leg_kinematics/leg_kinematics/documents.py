@@ -1,8 +1,10 @@
-"""YAML documents whose mistakes are all told with file, line, key, value and what is allowed."""
+"""YAML documents whose mistakes are all told with file, line, key, value and what is allowed.
+
+They come from other people and other machines, so what reading one may cost has bounds.
+"""
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,23 +13,41 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError
 
+from leg_kinematics.bounded_yaml import MOST_CHARACTERS, load_yaml
 from leg_kinematics.errors import DescriptionError
+from leg_kinematics.files import read_text
 
-NAME = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$"}
+MOST_MISTAKES = 20  # that are told
+LONGEST_VALUE = 120  # characters of a value that are told
+
+NAME = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": 100}
 NUMBER = {"type": "number"}
 PAIR = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
 VECTOR = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
 
-# JSON Schema knows no NaN or infinity; in these documents a number is a finite number.
+
+def _is_number(_: Any, value: Any) -> bool:
+    """Whether a value is a finite number; JSON Schema knows no NaN or infinity."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    number: Any = value
+    return bool(abs(number) <= sys.float_info.max)  # also of integers that no float can hold
+
+
+def _unique(validator: Any, unique: bool, items: Any, _: Any) -> Iterator[Any]:
+    """Check `uniqueItems` of scalars; the library compares all pairs of what has no order."""
+    listed = items if validator.is_type(items, "array") else []
+    scalars = [item for item in listed if isinstance(item, (str, Real))]
+    if unique and len(set(scalars)) < len(scalars):
+        yield jsonschema.ValidationError(f"{_shown(items)} has equal items")
+
+
 _Validator: Any = jsonschema.validators.extend(  # type: ignore[no-untyped-call]
     jsonschema.Draft202012Validator,
-    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
-        "number",
-        lambda _, x: isinstance(x, Real) and not isinstance(x, bool) and math.isfinite(x),
-    ),
+    {"uniqueItems": _unique},
+    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number),
 )
 
 
@@ -41,11 +61,12 @@ def mapping_schema(properties: Mapping[str, Any], required: Sequence[str]) -> di
     }
 
 
-def named_schema(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """Schema of a non-empty mapping from names to `schema`."""
+def named_schema(schema: Mapping[str, Any], most: int = 1000) -> dict[str, Any]:
+    """Schema of a mapping from at least one and at most `most` names to `schema`."""
     return {
         "type": "object",
         "minProperties": 1,
+        "maxProperties": most,
         "propertyNames": NAME,
         "additionalProperties": schema,
     }
@@ -68,20 +89,19 @@ class Document:
             text: Its text; None to read it from the file.
 
         Raises:
-            DescriptionError: If it cannot be read or parsed.
+            DescriptionError: If it cannot be read or parsed, or is too large.
         """
         self.path = path
+        self.text = read_text(path, MOST_CHARACTERS) if text is None else text
         try:
-            self.text = path.read_text(encoding="utf-8") if text is None else text
-            self.root: Any = YAML(typ="rt").load(self.text)
+            self.root: Any = load_yaml(self.text)
         except MarkedYAMLError as error:
             mark = error.problem_mark
             where = f"{path}:{mark.line + 1}" if mark else str(path)
-            raise DescriptionError(f"{where}: {error.problem or error.context}") from None
-        except OSError as error:
-            raise DescriptionError(f"{path}: {error.strerror}") from None
-        except (YAMLError, UnicodeDecodeError, RecursionError) as error:
-            raise DescriptionError(f"{path}: {error}") from None
+            problem = _cut(str(error.problem or error.context))
+            raise DescriptionError(f"{where}: {problem}") from None
+        except Exception as error:  # of dates, numbers and tags that are none
+            raise DescriptionError(f"{path}: {_cut(str(error))}") from None
 
     def node(self, *where: Any) -> Any:
         """Return the part of the document at a path of keys."""
@@ -97,10 +117,11 @@ class Document:
             DescriptionError: With one line for every mistake.
         """
         errors = _Validator(schema).iter_errors(self.node(*where))
-        lines = [
-            str(self.error(_message(e), *where, *e.absolute_path))
-            for e in sorted(errors, key=lambda e: list(map(str, e.path)))
-        ]
+        mistakes = sorted(errors, key=lambda e: list(map(str, e.path)))
+        told = [str(self.error(_message(e), *where, *e.absolute_path)) for e in mistakes]
+        lines = list(dict.fromkeys(told))  # each missing key is an error that names them all
+        if len(lines) > MOST_MISTAKES:
+            lines[MOST_MISTAKES:] = [f"{self.path}: {len(lines) - MOST_MISTAKES} more mistakes"]
         if lines:
             raise DescriptionError("\n".join(lines))
 
@@ -116,31 +137,44 @@ class Document:
             except (AttributeError, KeyError, IndexError, TypeError):
                 break
         place = f"{self.path}:{line}" if line is not None else str(self.path)
-        return DescriptionError(f"{place}: {'.'.join(map(str, where)) or 'document'}: {message}")
+        keys = _cut(".".join(map(str, where))) or "document"
+        return DescriptionError(f"{place}: {keys}: {message}")
 
 
 def _message(error: Any) -> str:
     """Say in one line what the value was and what is allowed."""
-    value = error.instance
+    value = _shown(error.instance)
+    limit = error.validator_value
     if error.validator == "additionalProperties" and error.schema.get("properties") is not None:
         allowed = list(error.schema["properties"])
-        unknown = ", ".join(repr(str(k)) for k in value if k not in allowed)
-        return f"unknown key {unknown}; allowed: {', '.join(allowed)}"
+        unknown = ", ".join(repr(str(k)) for k in error.instance if k not in allowed)
+        return f"unknown key {_cut(unknown)}; allowed: {', '.join(allowed)}"
     if error.validator == "required":
-        missing = ", ".join(repr(k) for k in error.validator_value if k not in value)
-        return f"missing key {missing}"
+        return f"missing key {', '.join(repr(k) for k in limit if k not in error.instance)}"
     if error.validator == "enum":
-        return f"{value!r} is not one of: {', '.join(map(str, error.validator_value))}"
+        return f"{value} is not one of: {', '.join(map(str, limit))}"
     if error.validator == "exclusiveMinimum":
-        return f"{value!r} must be > {error.validator_value}"
+        return f"{value} must be > {limit}"
     if error.validator == "minimum":
-        return f"{value!r} must be >= {error.validator_value}"
+        return f"{value} must be >= {limit}"
+    if error.validator == "maximum":
+        return f"{value} must be <= {limit}"
+    if error.validator == "maxProperties":
+        return f"{len(error.instance)} entries; allowed: at most {limit}"
     if error.validator == "type":
-        wanted = {"number": "finite number"}.get(error.validator_value, error.validator_value)
-        return f"{value!r} is not a {wanted}"
+        return f"{value} is not a {({'number': 'finite number'}).get(limit, limit)}"
     if error.validator == "oneOf" and "description" in error.schema:
-        return f"{value!r} must be {error.schema['description']}"
-    return str(error.message)
+        return f"{value} must be {error.schema['description']}"
+    return _cut(str(error.message).replace(repr(error.instance), value))
+
+
+def _shown(value: Any) -> str:
+    """Return a value as it is told: not all of a long one."""
+    return _cut(repr(value))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
 
 
 def shared_files(package: str, folder: str, suffix: str) -> dict[str, Path]:

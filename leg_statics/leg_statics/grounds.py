@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 from leg_kinematics.documents import NUMBER, Document, mapping_schema, named_schema, shared_files
-from leg_kinematics.errors import DescriptionError, UnknownNameError
+from leg_kinematics.errors import UnknownNameError
+from leg_kinematics.files import existing_path
 
 GROUNDS_SCHEMA = mapping_schema(
     {
@@ -72,10 +72,7 @@ def load_grounds(source: str | os.PathLike[str] = "grounds") -> Grounds:
         DescriptionError: If the file is missing or wrong.
     """
     shipped = shared_files("leg_bringup", ".", "grounds.yaml")
-    path = shipped.get(str(source), Path(source).expanduser())
-    if not path.is_file():
-        raise DescriptionError(f"grounds file {path} does not exist")
-    document = Document(path)
+    document = Document(shipped.get(str(source)) or existing_path("grounds file", source))
     document.check(GROUNDS_SCHEMA)
     grounds = {}
     for name, entry in document.root["grounds"].items():

@@ -142,7 +142,7 @@ BAD = {
     "negative length": ("{from: 100,", "{from: -1,", ["drive_lever", "-1", "> 0"]),
     "step 0": ("step: 10", "step: 0", ["parallelogram_link.step", "> 0"]),
     "step does not fit": ("step: 10", "step: 7", ["parallelogram_link.step", "whole number"]),
-    "step too small": ("step: 10", "step: 1e-9", ["parallelogram_link.step", "1000000"]),
+    "step too small": ("step: 10", "step: 1e-9", ["parallelogram_link.step", "100000"]),
     "no values": ("[-36, -30]", "[]", ["crank_zero.values"]),
     "unknown objective": (
         "[condition_number,",
@@ -172,6 +172,7 @@ BAD = {
         "{name: grid}",
         ["parameters.drive_lever", "step or values"],
     ),
+    "budget without end": ("designs: 100", "designs: 1000000000000", ["method.designs", "<= 1000"]),
     "negative seed": ("seed: 3", "seed: -3", ["seed", ">= 0"]),
     "tolerance": ("tolerance: 0.02", "tolerance: 0", ["tolerance", "> 0"]),
     "no YAML": ("units: {", "units: {{", ["study.yaml:"]),
@@ -185,6 +186,13 @@ def test_a_wrong_study_is_told_where_and_why(load, case):
         load(old, new)
     for word in ["study.yaml", *words]:
         assert word in str(caught.value)
+
+
+def test_a_grid_without_end_is_refused(tmp_path):
+    text = STUDY.replace("{name: nsga2, designs: 100, population: 20}", "{name: grid}")
+    text = text.replace("to: 160}", "to: 160, step: 0.001}").replace("step: 10}", "step: 0.01}")
+    with pytest.raises(DescriptionError, match=r"parameters: 1200140002 combinations; allowed"):
+        study_from_document(Document(tmp_path / "study", text))
 
 
 def test_a_missing_study_is_told(tmp_path):

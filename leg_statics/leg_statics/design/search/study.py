@@ -34,7 +34,6 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +42,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.description import UNITS, find_robot_file, robot_from_document
 from leg_kinematics.documents import NAME, NUMBER, Document, mapping_schema
 from leg_kinematics.errors import LegError, UnknownNameError
+from leg_kinematics.files import user_path
 from leg_kinematics.mechanism import SI_UNITS, Mechanism, geometry_parameters
 from leg_kinematics.robot import Leg
 from leg_statics.design.designs import (
@@ -59,8 +59,10 @@ from leg_statics.grounds import load_grounds
 from leg_statics.step_length import Criterion
 
 VERSION = 1
-MOST_VALUES = 1_000_000  # of one parameter
+MOST_VALUES = 100_000  # of one parameter
 LEAST = {"designs": 1, "population": 8}  # an optimiser needs some variety
+MOST = {"designs": 10**9, "population": 10**5}
+MOST_SEED = 2**32 - 1
 
 SPAN_SCHEMA = mapping_schema({"from": NUMBER, "to": NUMBER}, ["from", "to"])
 STEPS_SCHEMA = mapping_schema(
@@ -88,7 +90,10 @@ METHOD_SCHEMAS = {
     name: mapping_schema(
         {
             "name": {"const": name},
-            **{key: {"type": "integer", "minimum": LEAST[key]} for key in method.keys},
+            **{
+                key: {"type": "integer", "minimum": LEAST[key], "maximum": MOST[key]}
+                for key in method.keys
+            },
         },
         ["name", *method.keys],
     )
@@ -116,7 +121,7 @@ STUDY_SCHEMA = mapping_schema(
             "properties": {"name": {"enum": list(METHODS)}},
             "required": ["name"],
         },
-        "seed": {"type": "integer", "minimum": 0},
+        "seed": {"type": "integer", "minimum": 0, "maximum": MOST_SEED},
         "tolerance": {**NUMBER, "exclusiveMinimum": 0, "exclusiveMaximum": 1},
     },
     ["version", "name", "units", "base", "parameters", "objectives", "method"],
@@ -303,7 +308,7 @@ def load_study(path: str | os.PathLike[str]) -> Study:
         DescriptionError: If anything in it is wrong; the message names file, line, key, the value
             and what is allowed.
     """
-    return study_from_document(Document(Path(path).expanduser()))
+    return study_from_document(Document(user_path(path)))
 
 
 def study_from_document(document: Document, robot: str = "") -> Study:
@@ -416,7 +421,7 @@ def _steps(
     if "step" not in entry:
         return ()
     step = entry["step"]
-    count = (upper - lower) / step
+    count = (float(upper) - float(lower)) / step
     if not count < MOST_VALUES:
         raise document.error(
             f"{step!r}: makes {count:.3g} values; allowed: {MOST_VALUES}", *where, "step"
@@ -501,6 +506,10 @@ def _draw(document: Document, parameters: Sequence[Parameter]) -> Draw:
                     parameter.name,
                 )
         designs = math.prod(count for count in cells if count)
+        if designs > MOST["designs"]:
+            raise document.error(
+                f"{designs} combinations; allowed: at most {MOST['designs']}", "parameters"
+            )
     population = method.get("population", 1)
     if designs < population:
         raise document.error(
