@@ -10,7 +10,7 @@ import numpy as np
 from leg_kinematics import Leg, Status, load_robot
 from leg_kinematics.arrays import FloatArray
 from leg_statics.footholds import Contact
-from leg_statics.maps import workspace_bounds
+from leg_statics.workspace import workspace_bounds
 
 SEED = 20170721
 BATCH = 10_000

@@ -234,7 +234,8 @@ def show_refusals(client: LegClient, leg: LegDescription) -> None:
 def draw_maps(client: LegClient, output: Path) -> None:
     """Ask the maps node for planes of one leg's workspace and draw them."""
     # Imported here, while the planner walks: it takes seconds.
-    from leg_statics.drawing import plots
+    from leg_statics.drawing.maps import plot_maps
+    from leg_statics.drawing.style import height_title
     from leg_statics.maps import CAPACITY_LAYER, IndexMap
 
     def plane(height: float, layer: str, ground: str) -> IndexMap:
@@ -245,14 +246,13 @@ def draw_maps(client: LegClient, output: Path) -> None:
     middle = MAP_HEIGHTS[len(MAP_HEIGHTS) // 2]
     capacity = {ground: plane(middle, CAPACITY_LAYER, ground) for ground in GROUNDS}
     friction = {
-        plots.height_title(height): plane(height, "rated_friction", GROUNDS[0])
-        for height in MAP_HEIGHTS
+        height_title(height): plane(height, "rated_friction", GROUNDS[0]) for height in MAP_HEIGHTS
     }
-    title = f"right front leg, {plots.height_title(middle)}"
+    title = f"right front leg, {height_title(middle)}"
     for figure, name in (
-        (plots.plot_maps(capacity, CAPACITY_LAYER, title=title), "map_load_capacity.png"),
+        (plot_maps(capacity, CAPACITY_LAYER, title=title), "map_load_capacity.png"),
         (
-            plots.plot_maps(friction, "rated_friction", title="right front leg"),
+            plot_maps(friction, "rated_friction", title="right front leg"),
             "map_rated_friction.png",
         ),
     ):

@@ -22,7 +22,8 @@ from rich.table import Table
 
 import leg_statics.published
 from leg_statics.commands import plot_index_map, synthesize_six_bar
-from leg_statics.drawing import plots
+from leg_statics.drawing.designs import plot_designs
+from leg_statics.drawing.style import write_figure
 from leg_statics.published import paper_000, plot_gantry_example
 from leg_statics.published.comparison import Comparison
 
@@ -40,8 +41,8 @@ def draw_paper_000(folder: Path) -> None:
         "paper's optimum": found.means[found.find(tuple(paper_000.OPTIMISED_LENGTHS.values()))],
         "best by (33)": found.means[np.argmax(found.objective)],
     }
-    figure = plots.plot_designs(found.means[found.known], marked, before=found.before)
-    figure.savefig(folder / "hexapod_initial_7.png", dpi=plot_index_map.RESOLUTION)
+    figure = plot_designs(found.means[found.known], marked, before=found.before)
+    write_figure(figure, folder / "hexapod_initial_7.png")
 
 
 def draw_paper_001(folder: Path) -> None:

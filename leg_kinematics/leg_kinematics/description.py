@@ -130,6 +130,24 @@ def load_robot(source: str | os.PathLike[str]) -> Robot:
     return robot_from_document(Document(find_robot_file(source)))
 
 
+def load_leg_types(source: str | os.PathLike[str]) -> dict[str, Leg]:
+    """Load each leg type of a description as a leg of that name, at the base frame's origin.
+
+    Args:
+        source: Path of a YAML file, or the name of a robot that ships with `leg_bringup`.
+
+    Raises:
+        DescriptionError: If the file is missing or wrong.
+    """
+    document = Document(find_robot_file(source))
+    document.check(ROBOT_SCHEMA)
+    mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}
+    document.root["legs"] = {
+        name: {"type": name, "mount": mount} for name in document.root["leg_types"]
+    }
+    return dict(robot_from_document(document).legs)
+
+
 def find_robot_file(source: str | os.PathLike[str]) -> Path:
     """Return the path of a description given by path or by the name of a shipped robot.
 

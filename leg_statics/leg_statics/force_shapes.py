@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.errors import NotSupportedError, ValueRangeError
 
 # Corners of the box of joint efforts, as choices of lower (0) or upper (1), and its edges.
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -37,6 +38,42 @@ def force_polytope(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
         return np.full((len(CORNERS), 3), np.nan)
     corners: FloatArray = -np.linalg.solve(j.T, efforts.T).T
     return corners
+
+
+def force_polygon(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
+    """Corners of the plane ground reactions that the actuators can hold (k, 2) [N], in order.
+
+    Only those count that push the foot up. A force beyond any use, along which the structure alone
+    carries the load, is cut off.
+
+    Args:
+        jacobian: The two rows of J of the plane's directions, the vertical one last (2, n).
+        effort_limits: Lower (< 0) and upper (> 0) effort of each actuator (n, 2) [N.m or N].
+
+    Raises:
+        NotSupportedError: If there are fewer than three actuators: the structure alone holds
+            forces of any size.
+        ValueRangeError: If an actuator can exert nothing in one direction.
+    """
+    j = as_array("jacobian", jacobian)
+    limits = as_array("effort_limits", effort_limits, j.shape[-1], 2)
+    if len(limits) < 3:
+        raise NotSupportedError("a leg with fewer than three actuators has too few for forces")
+    lower, upper = limits.T
+    if not np.all((lower < 0.0) & (upper > 0.0)):
+        raise ValueRangeError("drawing forces needs effort limits with lower < 0 < upper")
+    from scipy.spatial import HalfspaceIntersection  # slow to import
+
+    normals = np.concatenate([-j.T, j.T])  # the efforts are -J^T F
+    room = np.concatenate([upper, -lower])
+    largest = 1e3 * np.max(room) / np.max(np.abs(j))
+    frame = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    distances = np.concatenate([room, [largest, largest, largest, 0.0]])
+    inside = 0.5 * np.min(room) / (np.max(np.abs(j)) + np.finfo(float).tiny)
+    halfspaces = np.column_stack([np.concatenate([normals, frame]), -distances])
+    corners = HalfspaceIntersection(halfspaces, np.array([0.0, inside])).intersections
+    centre = corners.mean(axis=0)
+    return np.asarray(corners[np.argsort(np.arctan2(*(corners - centre).T[::-1]))])
 
 
 def friction_cone(friction: float, normal: ArrayLike, points: int = 32) -> FloatArray:

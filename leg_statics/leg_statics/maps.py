@@ -1,4 +1,4 @@
-"""Index maps: every index of a leg over a plane of the workspace or over all of it."""
+"""Index maps: every index of a leg over a line or plane of the workspace or over all of it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from leg_kinematics.errors import NotSupportedError, UnknownNameError, ValueRang
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, judge_footholds
-from leg_statics.global_means import actuator_grid
 from leg_statics.indices import find_index, indices_of, supported_indices
 from leg_statics.kinematics import Kinematics
+from leg_statics.workspace import workspace_bounds
 
 CAPACITY_LAYER = "load_capacity"
 MOST_POINTS = 20_000_000
@@ -52,17 +52,6 @@ class IndexMap(NamedTuple):
 def supported_layers(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the layers that a map of this mechanism can have."""
     return (*supported_indices(mechanism), CAPACITY_LAYER)
-
-
-def workspace_bounds(mechanism: Mechanism, points_per_joint: int = 15) -> FloatArray:
-    """Box in the leg frame that holds the workspace (3, 2) [m], with a margin of 2 %."""
-    posture = mechanism.forward(actuator_grid(mechanism, points_per_joint))
-    foot = posture.foot_position[posture.status == Status.OK]
-    if not len(foot):
-        raise ValueRangeError(f"mechanism {mechanism.name!r} reaches no point within its limits")
-    lower, upper = foot.min(axis=0), foot.max(axis=0)
-    margin = 0.02 * np.max(upper - lower) + 0.5 * (upper - lower) / points_per_joint
-    return np.stack([lower - margin, upper + margin], axis=-1)
 
 
 class Layer(NamedTuple):
@@ -148,6 +137,40 @@ def plane_map(
     x, y = _axes(mechanism, resolution, 2)
     values, status = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
     return IndexMap(x, y, np.array([height]), names, values[None], status[None])
+
+
+def line_map(
+    mechanism: Mechanism,
+    x: float,
+    height: float,
+    resolution: float,
+    *,
+    layers: Sequence[str] = (),
+    effort_limits: ArrayLike | None = None,
+    contact: Contact | None = None,
+) -> IndexMap:
+    """Map the layers along the line at x and z = height, which runs in the walking direction.
+
+    Args:
+        mechanism: The leg's mechanism.
+        x: x of the line in the leg frame [m].
+        height: z of the line in the leg frame [m].
+        resolution: Grid spacing [m].
+        layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
+        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
+        contact: Ground for the layer "load_capacity".
+
+    Raises:
+        UnknownNameError: If a layer does not exist.
+        ValueRangeError: If place or resolution are out of range.
+    """
+    if not np.isfinite([x, height]).all():
+        raise ValueRangeError(f"x and height must be finite, got {x} and {height}")
+    names = _layers(mechanism, layers, effort_limits, contact)
+    line = np.array([float(x)])
+    _, y = _axes(mechanism, resolution, 2)
+    values, status = _slice(mechanism, line, y, float(height), names, effort_limits, contact)
+    return IndexMap(line, y, np.array([height]), names, values[None], status[None])
 
 
 def volume_map(

@@ -20,7 +20,7 @@ from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, Footholds, Verdict, evaluate_footholds
-from leg_statics.global_means import actuator_grid
+from leg_statics.workspace import actuator_grid
 
 END_TOLERANCE = 1e-6  # m, to which the ends of a stance are found
 SAMPLING = 2e-3  # m, a feasible stretch shorter than this may be overlooked

@@ -21,10 +21,11 @@ from leg_statics.design.designs import (
     supported_metrics,
 )
 from leg_statics.footholds import Contact, judge_footholds
-from leg_statics.global_means import means_on_grid, sample_workspace
 from leg_statics.indices import INDICES, supported_indices
 from leg_statics.kinematics import Kinematics
+from leg_statics.published.grid_means import grid_means
 from leg_statics.step_length import Criterion, longest_step
+from leg_statics.workspace import sample_workspace
 
 LEG = ParallelDrive()
 LIMITS = [[-150.0, 150.0]] * 3
@@ -74,7 +75,7 @@ def test_values_are_those_of_a_fine_grid_within_the_stated_error():
     names = ["condition_number", "unit_effort_capacity", "rated_friction", "constraint_moment"]
     found = evaluate_design(LEG, CHANGES, [*names, "workspace_volume", "usable_share"])
     leg = replace(LEG, **CHANGES)
-    fine = means_on_grid(leg, names, 44)
+    fine = grid_means(leg, names, 44)
     truth = [*fine.values, fine.volume, fine.usable]
     assert not found.problem
     assert found.change <= 0.005

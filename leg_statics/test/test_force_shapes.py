@@ -1,9 +1,11 @@
 """Shapes of forces, checked against the load capacity."""
 
 import numpy as np
+import pytest
 
+from leg_kinematics import NotSupportedError, ParallelDrive, ValueRangeError
 from leg_statics.capacity.problem import load_capacity
-from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
+from leg_statics.force_shapes import EDGES, force_polygon, force_polytope, friction_cone
 
 JACOBIAN = np.array([[0.3, -0.1, 0.05], [0.02, 0.25, -0.2], [-0.1, 0.05, 0.4]])
 LIMITS = np.array([[-100.0, 150.0], [-80.0, 80.0], [-60.0, 120.0]])
@@ -36,3 +38,21 @@ def test_the_rim_of_the_cone_is_where_the_foot_begins_to_slip():
     np.testing.assert_allclose(rim @ n, 1.0)
     np.testing.assert_allclose(np.linalg.norm(rim - n, axis=-1), 0.6)
     np.testing.assert_allclose(rim.mean(axis=0), n)
+
+
+def test_the_corners_of_the_force_polygon_use_an_actuator_fully():
+    leg = ParallelDrive()
+    jacobian = leg.jacobian(leg.initial_posture)[[1, 2]]
+    limits = np.array([[-150.0, 100.0], [-120.0, 150.0], [-90.0, 60.0]])
+    corners = force_polygon(jacobian, limits)
+    efforts = -corners @ jacobian
+    share = np.where(efforts > 0, efforts / limits[:, 1], efforts / limits[:, 0]).max(axis=1)
+    assert np.all(corners[:, 1] >= -1e-6)
+    np.testing.assert_allclose(share, 1.0, rtol=1e-6)
+
+
+def test_a_polygon_of_forces_needs_three_actuators_that_push_both_ways():
+    with pytest.raises(ValueRangeError, match="lower < 0 < upper"):
+        force_polygon(JACOBIAN[1:], np.array([[0.0, 1.0]] * 3))
+    with pytest.raises(NotSupportedError, match="fewer than three actuators"):
+        force_polygon(JACOBIAN[1:, :1], LIMITS[:1])

@@ -9,7 +9,7 @@ from leg_kinematics import Status, UnknownNameError, ValueRangeError
 from leg_kinematics.mirrored import Mirrored
 from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices, supported_indices
-from leg_statics.maps import plane_map, supported_layers, volume_map, workspace_bounds
+from leg_statics.maps import line_map, plane_map, supported_layers, volume_map
 from leg_statics.published.paper_000 import legs
 
 LEG = legs()["optimised"]
@@ -66,13 +66,15 @@ def test_a_volume_is_filled_plane_by_plane():
     assert np.isnan(first.values[1:]).all()
 
 
-def test_bounds_hold_every_reachable_point():
-    bounds = workspace_bounds(LEG)
-    q = np.random.default_rng(1).uniform(*LEG.joint_limits.T, (50_000, 3))
-    posture = LEG.forward(q)
-    foot = posture.foot_position[posture.status == Status.OK]
-    assert np.all(foot >= bounds[:, 0])
-    assert np.all(foot <= bounds[:, 1])
+def test_a_line_holds_what_the_plane_through_it_does():
+    plane = plane_map(LEG, -0.6, 0.01)
+    k = int(np.argmin(np.abs(plane.x - 0.05)))
+    line = line_map(LEG, plane.x[k], -0.6, 0.01)
+    np.testing.assert_array_equal(line.y, plane.y)
+    np.testing.assert_array_equal(line.values[0, :, 0], plane.values[0, :, k])
+    np.testing.assert_array_equal(line.status[0, :, 0], plane.status[0, :, k])
+    with pytest.raises(ValueRangeError, match="x and height must be finite"):
+        line_map(LEG, np.nan, -0.6, 0.01)
 
 
 def test_a_mirrored_leg_has_the_mirrored_map():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from leg_statics.global_means import means_on_grid
 from leg_statics.published import paper_000
+from leg_statics.published.grid_means import grid_means
 
 BEFORE, AFTER = paper_000.legs().values()
 THREE = list(paper_000.MEANS["initial"])
@@ -31,7 +31,7 @@ def found():
 def test_the_means_of_the_search_are_known_to_one_percent(found):
     assert found.error <= 0.01
     for means, leg in ((found.before, BEFORE), (found.means[found.find(OPTIMUM)], AFTER)):
-        np.testing.assert_allclose(means, means_on_grid(leg, THREE, 33).values, rtol=0.01)
+        np.testing.assert_allclose(means, grid_means(leg, THREE, 33).values, rtol=0.01)
 
 
 def test_designs_without_means_are_told(found):

@@ -12,9 +12,10 @@ from leg_kinematics import ParallelDrive, ValueRangeError
 from leg_kinematics.mechanisms import GantryHybrid, TheoJansen
 from leg_kinematics.mirrored import Mirrored
 from leg_statics.design.averages import FEWEST_POINTS, average, heights_by_volume
-from leg_statics.global_means import means_on_grid, sample_workspace
 from leg_statics.indices import evaluate_indices
 from leg_statics.published import paper_000
+from leg_statics.published.grid_means import grid_means
+from leg_statics.workspace import sample_workspace
 
 STAGES = paper_000.legs()
 THREE = ["condition_number", "unit_effort_capacity", "unit_moment_effort"]
@@ -31,7 +32,7 @@ def nothing(posture):
 @cache
 def truth(stage):
     """Means, volume and usable share on a fine grid; they are known to better than 0.1 %."""
-    fine = means_on_grid(STAGES[stage], THREE, 56)
+    fine = grid_means(STAGES[stage], THREE, 56)
     return np.array([*fine.values, fine.volume, fine.usable])
 
 
@@ -77,7 +78,7 @@ def test_the_workspace_of_a_crank_is_as_long_as_the_foot_curve():
 
 def test_four_actuators_are_averaged_as_on_a_grid():
     leg = GantryHybrid()
-    fine = means_on_grid(leg, ["condition_number"], 18)
+    fine = grid_means(leg, ["condition_number"], 18)
     found = average(leg, indices(leg, ["condition_number"]), 0.02)
     assert found.error <= 0.02
     np.testing.assert_allclose(found.values, fine.values, rtol=0.02)

@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from leg_kinematics.description import find_robot_file, robot_from_document
-from leg_kinematics.documents import Document
-from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError, ValueRangeError
-from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
+from leg_kinematics.description import load_leg_types, load_robot
+from leg_kinematics.errors import LegError, UnknownNameError, ValueRangeError
 from leg_kinematics.robot import Leg
 from leg_statics.commands.command_line import ArgumentParser
-from leg_statics.drawing import plots
-from leg_statics.global_means import means_on_grid
+from leg_statics.commands.leg_pictures import (
+    MAP_RESOLUTION,
+    capacity_picture,
+    friction_picture,
+    index_picture,
+    linkage_picture,
+    steps_picture,
+)
+from leg_statics.drawing.style import FORMATS, write_figure
 from leg_statics.grounds import Ground, load_grounds
 from leg_statics.indices import find_index, supported_indices
-from leg_statics.maps import workspace_bounds
-from leg_statics.published import paper_000
+from leg_statics.workspace import is_spatial_leg
 
 EXAMPLES = """\
 examples:
@@ -41,8 +44,6 @@ examples:
   %(prog)s --robot my_robot.yaml --leg front --all pictures
 """
 
-FORMATS = ("png", "svg", "pdf")
-RESOLUTION = 300  # dots per inch
 # Legs that figure 8 compares, if the robot has these types.
 COMPARED_TYPES = ("initial", "optimised")
 # Indices that the figures of paper 000 show.
@@ -62,7 +63,7 @@ class Request(NamedTuple):
     Attributes:
         robot: Name of the robot.
         legs: The leg, or several to compare in figure 8.
-        grounds: Grounds by name.
+        grounds: The grounds.
         heights: Heights of the foot in the leg frame [m]; none for those that suit the leg.
         resolution: Grid spacing of maps [m].
         load: Normal load that a step has to bear [N].
@@ -71,7 +72,7 @@ class Request(NamedTuple):
 
     robot: str
     legs: Sequence[Leg]
-    grounds: Mapping[str, Ground]
+    grounds: Sequence[Ground]
     heights: Sequence[float]
     resolution: float
     load: float
@@ -88,13 +89,9 @@ class Request(NamedTuple):
     @property
     def title(self) -> str:
         """Robot, leg and type."""
-        return _title(self.robot, self.leg)
-
-    @property
-    def frictions(self) -> dict[str, float]:
-        """Friction to count on by ground, the smoothest first."""
-        grounds = sorted(self.grounds.values(), key=lambda ground: ground.friction_low)
-        return {ground.name: ground.friction_low for ground in grounds}
+        leg = self.leg
+        own_name = leg.leg_type == leg.name
+        return f"{self.robot} {leg.name}" + ("" if own_name else f" ({leg.leg_type})")
 
     @property
     def height(self) -> float | None:
@@ -104,160 +101,41 @@ class Request(NamedTuple):
         return self.heights[0] if self.heights else None
 
 
-# --------------------------------------------------------------------------- figures
-
-
-def draw_index(request: Request, index: str) -> Figure:
-    """Draw an index at several heights."""
-    leg = request.leg
-    supported = supported_indices(leg.mechanism)
-    if plots.is_spatial_leg(leg.mechanism) and find_index(index).name not in supported:
-        raise NotSupportedError(
-            f"mechanism {leg.mechanism.name!r} has no index {index!r}; "
-            f"it has: {', '.join(supported)}"
-        )
-    _check_heights(leg, request.heights)
-    return plots.plot_index(
-        leg.mechanism, index, request.heights, request.resolution, title=request.title
+def _index(request: Request, index: str) -> Figure:
+    return index_picture(
+        request.leg, index, request.heights, request.resolution, title=request.title
     )
 
 
-def draw_rated_friction(request: Request) -> Figure:
-    """Draw figure 8."""
-    return plots.plot_rated_friction(
-        {leg.name: leg.mechanism for leg in request.legs},
-        list(request.grounds.values()),
-        request.heights,
-        title=request.robot,
+def _rated_friction(request: Request) -> Figure:
+    mechanisms = {leg.name: leg.mechanism for leg in request.legs}
+    return friction_picture(mechanisms, request.grounds, request.heights, title=request.robot)
+
+
+def _steps(request: Request) -> Figure:
+    return steps_picture(
+        request.leg, request.grounds, request.load, request.heights, title=request.title
     )
 
 
-def draw_steps(request: Request) -> Figure:
-    """Draw step length against height."""
-    leg = request.leg
-    _check_heights(leg, request.heights)
-    return plots.plot_step_lengths(
-        leg.mechanism,
-        leg.effort_limits,
-        request.frictions,
-        request.load,
-        request.heights or None,
-        title=request.title,
+def _capacity(request: Request) -> Figure:
+    return capacity_picture(
+        request.leg, request.grounds, request.height, request.resolution, title=request.title
     )
 
 
-def draw_capacity(request: Request) -> Figure:
-    """Draw the load capacity on every ground."""
-    leg = request.leg
-    _check_heights(leg, request.heights)
-    return plots.plot_load_capacity(
-        leg.mechanism,
-        leg.effort_limits,
-        request.frictions,
-        request.height,
-        request.resolution,
-        title=request.title,
-    )
-
-
-def draw_linkage(request: Request) -> Figure:
-    """Draw the leg in its initial posture."""
-    leg = request.leg
-    if not plots.is_spatial_leg(leg.mechanism):
-        return plots.plot_linkage(leg.mechanism, title=request.title)
-    return plots.plot_linkage(
-        leg.mechanism, leg.effort_limits, request.friction, title=request.title
-    )
-
-
-def draw_designs(request: Request) -> Figure:
-    """Draw figure 7: global means of the paper's 847 designs, about the dimensions of the leg."""
-    leg = request.leg.geometry
-    if not isinstance(leg, ParallelDrive):
-        raise NotSupportedError(
-            f"figure 7 varies the dimensions of {ParallelDrive.name!r}, got {leg.name!r}"
-        )
-    bar = partial(tqdm, desc="designs", unit="design", disable=None, leave=False)
-    _, means = paper_000.sampled_designs(leg, progress=bar)
-    optimum = {name: [value] for name, value in paper_000.OPTIMISED_LENGTHS.items()}
-    marked = {
-        request.leg.leg_type: means_on_grid(
-            leg, plots.DESIGN_MEANS, paper_000.PROTOCOL_GRID
-        ).values,
-        "paper's optimum": paper_000.sampled_designs(leg, optimum)[1][0],
-    }
-    return plots.plot_designs(means, marked, title=request.title)
-
-
-def _index_figure(index: str) -> Callable[[Request], Figure]:
-    return lambda request: draw_index(request, index)
+def _linkage(request: Request) -> Figure:
+    friction = request.friction if is_spatial_leg(request.leg.mechanism) else None
+    return linkage_picture(request.leg, friction, title=request.title)
 
 
 FIGURES: dict[str, Callable[[Request], Figure]] = {
-    **{name: _index_figure(index) for name, index in FIGURE_INDICES.items()},
-    "7": draw_designs,
-    "8": draw_rated_friction,
-    "steps": draw_steps,
-    "capacity": draw_capacity,
-    "linkage": draw_linkage,
+    **{name: partial(_index, index=index) for name, index in FIGURE_INDICES.items()},
+    "8": _rated_friction,
+    "steps": _steps,
+    "capacity": _capacity,
+    "linkage": _linkage,
 }
-
-
-SLOW_FIGURES = ("7",)  # drawn on request only
-
-
-def _title(robot: str, leg: Leg) -> str:
-    return f"{robot} {leg.name}" + (f" ({leg.leg_type})" if leg.leg_type != leg.name else "")
-
-
-def _check_heights(leg: Leg, heights: Sequence[float]) -> None:
-    """Raise a ValueRangeError for a height at which the leg reaches nothing."""
-    if not heights:
-        return
-    lower, upper = workspace_bounds(leg.mechanism)[2]
-    for height in heights:
-        if not lower <= height <= upper:
-            raise ValueRangeError(
-                f"height {height:g} m is outside the workspace of {leg.name}: "
-                f"{lower:.3f} to {upper:.3f} m"
-            )
-
-
-# --------------------------------------------------------------------------- legs
-
-
-def load_legs(
-    source: str, leg: str = "", types: Sequence[str] = ()
-) -> tuple[str, dict[str, Leg], list[Leg]]:
-    """Load the legs to draw.
-
-    Args:
-        source: Name or path of the robot description.
-        leg: Name of a leg; "" for the first one.
-        types: Names of leg types, to draw them as such instead of a leg.
-
-    Returns:
-        The robot's name, a leg of every type by the type's name, and the legs chosen.
-
-    Raises:
-        DescriptionError: If the description is missing or wrong.
-        UnknownNameError: If there is no such leg or type.
-    """
-    document = Document(find_robot_file(source))
-    robot = robot_from_document(document)
-    names = list(document.root["leg_types"])
-    mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}
-    document.root["legs"] = {name: {"type": name, "mount": mount} for name in names}
-    by_type = dict(robot_from_document(document).legs)
-    for name in types:
-        if name not in by_type:
-            raise UnknownNameError("leg type", name, by_type)
-    if types:
-        return robot.name, by_type, [by_type[name] for name in types]
-    return robot.name, by_type, [robot.leg(leg or next(iter(robot.legs)))]
-
-
-# --------------------------------------------------------------------------- command
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -309,7 +187,7 @@ def make_parser() -> argparse.ArgumentParser:
     how.add_argument(
         "--resolution",
         type=float,
-        default=0.005,
+        default=MAP_RESOLUTION,
         metavar="D",
         help="grid spacing of maps [m] (default: %(default)s)",
     )
@@ -370,27 +248,41 @@ def _run(options: argparse.Namespace) -> list[Path]:
         if options.all is not None:
             raise ValueRangeError("--all takes no --output; its argument is the folder")
         _check_output(options.output)
-    robot, by_type, legs = load_legs(options.robot, options.leg, options.type)
-    request = Request(
-        robot,
+    request = _request(options)
+    compared = request
+    types = load_leg_types(options.robot)
+    if not options.leg and not options.type and set(COMPARED_TYPES) <= set(types):
+        compared = request._replace(legs=[types[name] for name in COMPARED_TYPES])
+    if options.all is not None:
+        return _draw_all(request, compared, Path(options.all), options.format)
+    if options.index is not None:
+        figure = _index(request, options.index)
+        return [write_figure(figure, options.output or _file(request, options.index))]
+    subject = compared if options.figure == "8" else request
+    figure = FIGURES[options.figure](subject)
+    return [write_figure(figure, options.output or _file(subject, options.figure))]
+
+
+def _request(options: argparse.Namespace) -> Request:
+    """Load the legs, the first one if none is named, and the grounds."""
+    robot = load_robot(options.robot)
+    if options.type:
+        types = load_leg_types(options.robot)
+        for name in options.type:
+            if name not in types:
+                raise UnknownNameError("leg type", name, types)
+        legs = [types[name] for name in options.type]
+    else:
+        legs = [robot.leg(options.leg or next(iter(robot.legs)))]
+    return Request(
+        robot.name,
         legs,
-        load_grounds(options.grounds).by_name,
+        list(load_grounds(options.grounds).by_name.values()),
         options.heights,
         options.resolution,
         options.load,
         options.friction,
     )
-    compared = request
-    if not options.leg and not options.type and set(COMPARED_TYPES) <= set(by_type):
-        compared = request._replace(legs=[by_type[name] for name in COMPARED_TYPES])
-    if options.all is not None:
-        return _draw_all(request, compared, Path(options.all), options.format)
-    if options.index is not None:
-        figure = draw_index(request, options.index)
-        return [_write(figure, options.output or _file(request, options.index))]
-    subject = compared if options.figure == "8" else request
-    figure = FIGURES[options.figure](subject)
-    return [_write(figure, options.output or _file(subject, options.figure))]
 
 
 def _draw_all(request: Request, compared: Request, folder: Path, suffix: str) -> list[Path]:
@@ -398,19 +290,15 @@ def _draw_all(request: Request, compared: Request, folder: Path, suffix: str) ->
     if request.heights:
         raise ValueRangeError("--all takes no --heights: its figures need different ones")
     names = ["linkage"]
-    if plots.is_spatial_leg(request.leg.mechanism):
+    if is_spatial_leg(request.leg.mechanism):
         supported = supported_indices(request.leg.mechanism)
-        names = [
-            name
-            for name in FIGURES
-            if FIGURE_INDICES.get(name, supported[0]) in supported and name not in SLOW_FIGURES
-        ]
+        names = [name for name in FIGURES if FIGURE_INDICES.get(name, supported[0]) in supported]
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name in tqdm(names, desc="drawing", unit="figure", disable=None, leave=False):
         subject = compared if name == "8" else request
         figure = FIGURES[name](subject)
-        paths.append(_write(figure, folder / _file(subject, name, suffix)))
+        paths.append(write_figure(figure, folder / _file(subject, name, suffix)))
     return paths
 
 
@@ -426,14 +314,6 @@ def _check_output(path: Path) -> None:
         raise UnknownNameError("picture format", suffix, FORMATS)
     if not path.parent.is_dir():
         raise ValueRangeError(f"folder {path.parent} does not exist")
-
-
-def _write(figure: Figure, path: Path) -> Path:
-    """Write a picture; the same picture gives the same bytes."""
-    stamp = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
-    with mpl.rc_context({"svg.hashsalt": "leg_statics"}):
-        figure.savefig(path, dpi=RESOLUTION, metadata=stamp)
-    return path
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
+from leg_statics.workspace import volume_factor
 
 SEQUENCES = 8  # fewer tell the error badly, with more each of them is coarser
 FIRST_LENGTH = 64  # points of each sequence to start with
@@ -122,7 +123,7 @@ def heights_by_volume(mechanism: Mechanism, count: int) -> FloatArray:
     if not len(z):
         return np.empty(0)
     order = np.argsort(z)
-    volume = np.cumsum(_volume_factor(mechanism.jacobian(posture))[ok][order])
+    volume = np.cumsum(volume_factor(mechanism.jacobian(posture))[ok][order])
     share = (np.arange(count) + 0.5) / count
     return np.interp(share, volume / volume[-1], z[order])
 
@@ -145,19 +146,10 @@ def _sums(
 ) -> FloatArray:
     """Sum 1, dW/dq and dW/dq times each function over the OK poses of each sequence (s, 2 + K)."""
     ok = np.asarray(posture.status) == Status.OK
-    volume = _volume_factor(mechanism.jacobian(posture))[..., None]
+    volume = volume_factor(mechanism.jacobian(posture))[..., None]
     terms = np.concatenate([np.ones_like(volume), volume, volume * functions(posture)], axis=-1)
     total: FloatArray = np.sum(terms, axis=1, where=ok[..., None])
     return total
-
-
-def _volume_factor(jacobian: FloatArray) -> FloatArray:
-    """dW/dq = sqrt(det JᵀJ), which is |det J| of a square J (...,)."""
-    rows, columns = jacobian.shape[-2:]
-    with np.errstate(invalid="ignore"):
-        if rows == columns:
-            return np.abs(np.linalg.det(jacobian))
-        return np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian))
 
 
 def _averages(means: FloatArray, box: float, points: int) -> Averages:

@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_kinematics import GeometryError, ParallelDrive
+from leg_kinematics import ParallelDrive
 from leg_kinematics.arrays import FloatArray
 from leg_statics.design.designs import STEP_LENGTH, Conditions, Evaluation, evaluate_design
 from leg_statics.design.search.workers import LocalWorkers
 from leg_statics.footholds import Contact
-from leg_statics.global_means import means_on_grid
 from leg_statics.indices import INDICES, evaluate_indices
 from leg_statics.published.comparison import Comparison, compare_claim, compare_number
+from leg_statics.published.grid_means import PROTOCOL_GRID, grid_means
 from leg_statics.step_length import Criterion, longest_step
 
 PAPER = "000"
@@ -50,7 +50,6 @@ MEANS = {
 CHANGES = {"condition_number": -5.46, "unit_effort_capacity": 18.02, "unit_moment_effort": -6.33}
 # Heights h of the foot between which the workspace is widest [m].
 PLANES = {"initial": (-0.84, -0.62), "optimised": (-0.72, -0.52)}
-PROTOCOL_GRID = 11  # points per actuator, cell mid-points
 
 # Static friction of the foot's rubber on the ground, section 3.3.
 GROUNDS = {"ice": (0.08, 0.4), "wood": (0.6, 0.9), "cement": (0.4, 0.7)}
@@ -114,32 +113,6 @@ def slices(leg: ParallelDrive, heights: FloatArray, spacing: float = 0.015) -> S
         values[:, 40],
         y,
     )
-
-
-def sampled_designs(
-    leg: ParallelDrive,
-    grid: Mapping[str, Sequence[float]] = SEARCH_GRID,
-    progress: Callable[[list[tuple[float, ...]]], Iterable[tuple[float, ...]]] = iter,
-) -> tuple[FloatArray, FloatArray]:
-    """Compute the three global means of every design of a grid: the samples of figure 7.
-
-    Args:
-        leg: The leg whose other dimensions the designs have.
-        grid: Values of each dimension to vary [m]; the paper's 7 x 11 x 11 by default.
-        progress: Wraps the list of designs to show how far it is.
-
-    Returns:
-        The designs that can be assembled (m, len(grid)) and their means (m, 3).
-    """
-    designs, means = [], []
-    for values in progress(list(product(*grid.values()))):
-        try:
-            design = replace(leg, **dict(zip(grid, values, strict=True)))  # type: ignore[arg-type]
-        except GeometryError:
-            continue
-        designs.append(values)
-        means.append(means_on_grid(design, list(MEANS["initial"]), PROTOCOL_GRID).values)
-    return np.array(designs).reshape(-1, len(grid)), np.array(means).reshape(-1, 3)
 
 
 class Search(NamedTuple):
@@ -261,7 +234,7 @@ def mean_comparisons() -> list[Comparison]:
     rows = []
     for label, zeros in (("fitted crank zeros", {}), ("natural crank zeros", NATURAL_ZEROS)):
         for stage, leg in legs(**zeros).items():
-            means = means_on_grid(leg, list(MEANS[stage]), PROTOCOL_GRID)
+            means = grid_means(leg, list(MEANS[stage]))
             for name, ours in zip(means.names, means.values, strict=True):
                 rows.append(
                     compare_number(

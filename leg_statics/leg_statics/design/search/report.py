@@ -11,7 +11,7 @@ import numpy as np
 from leg_statics.design.designs import find_metric
 from leg_statics.design.search.geometry_search import TABLE, Numbered, Outcome, write_text
 from leg_statics.design.search.improved_robot import improved_robot
-from leg_statics.drawing.designs import draw_search
+from leg_statics.design.search.pictures import search_pictures
 
 REPORT, WINNER = "report.md", "winner.yaml"
 RESOLUTION = 200  # dots per inch
@@ -38,7 +38,7 @@ def write_results(outcome: Outcome, folder: Path) -> list[Path]:
         paths.append(folder / WINNER)
         write_text(paths[-1], winner_robot(outcome))
     pictures = []
-    for name, figure in draw_search(outcome).items():
+    for name, figure in search_pictures(outcome).items():
         pictures.append(folder / f"{name}.png")
         figure.savefig(pictures[-1], dpi=RESOLUTION)
     report = "\n".join(_report(outcome, pictures)) + "\n"
