@@ -19,7 +19,7 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "kinematics_node = leg_msgs_py.nodes:kinematics_node",
+            "kinematics_node = leg_kinematics.nodes.entry_points:kinematics_node",
         ],
     },
 )

@@ -20,13 +20,13 @@ setup(
     entry_points={
         "console_scripts": [
             "plot_gantry_example = leg_statics.published.plot_gantry_example:main",
-            "designs_node = leg_msgs_py.nodes:designs_node",
+            "designs_node = leg_statics.nodes.entry_points:designs_node",
             "judge_bag = leg_statics.recordings.judge_bag:main",
-            "maps_node = leg_msgs_py.nodes:maps_node",
+            "maps_node = leg_statics.nodes.entry_points:maps_node",
             "plot_index_map = leg_statics.commands.plot_index_map:main",
             "search_geometry = leg_statics.commands.search_geometry:main",
             "synthesize_six_bar = leg_statics.commands.synthesize_six_bar:main",
-            "statics_node = leg_msgs_py.nodes:statics_node",
+            "statics_node = leg_statics.nodes.entry_points:statics_node",
         ],
     },
 )

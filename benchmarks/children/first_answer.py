@@ -6,13 +6,13 @@ START = time.perf_counter()
 
 import json  # noqa: E402
 
-import leg_kinematics  # noqa: E402
 import leg_statics.footholds  # noqa: E402
 import leg_statics.maps  # noqa: E402
+from leg_kinematics import load_robot  # noqa: E402
 
 IMPORTED = time.perf_counter()
 
-leg = leg_kinematics.load_robot("hexapod").legs["right_front"]
+leg = load_robot("hexapod").legs["right_front"]
 mechanism = leg.mechanism
 foot = mechanism.initial_posture.foot_position
 contact = leg_statics.footholds.Contact(friction=0.4, load=300.0)

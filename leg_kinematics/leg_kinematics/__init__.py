@@ -1,42 +1,11 @@
 """Kinematics of legs with closed kinematic chains; needs numpy, scipy and numba, not ROS."""
 
-from leg_kinematics.description import load_robot
-from leg_kinematics.errors import (
-    DescriptionError,
-    GeometryError,
-    LegError,
-    NotSupportedError,
-    ShapeError,
-    UnknownNameError,
-    ValueRangeError,
-)
-from leg_kinematics.mechanism import Joint, Linkage, Mechanism, Posture
-from leg_kinematics.mechanisms.double_rhombus import DoubleRhombus
-from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
-from leg_kinematics.mechanisms.six_bar import SixBar
-from leg_kinematics.mechanisms.theo_jansen import TheoJansen
-from leg_kinematics.robot import Leg, Mount, Robot
-from leg_kinematics.status import Status
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "DescriptionError",
-    "DoubleRhombus",
-    "GeometryError",
-    "Joint",
-    "Leg",
-    "LegError",
-    "Linkage",
-    "Mechanism",
-    "Mount",
-    "NotSupportedError",
-    "ParallelDrive",
-    "Posture",
-    "Robot",
-    "ShapeError",
-    "SixBar",
-    "Status",
-    "TheoJansen",
-    "UnknownNameError",
-    "ValueRangeError",
-    "load_robot",
-]
+from leg_kinematics.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from leg_kinematics.exports import *  # noqa: F403
+    from leg_kinematics.exports import __all__ as __all__
+else:
+    __getattr__, __dir__ = lazy_exports(__name__)

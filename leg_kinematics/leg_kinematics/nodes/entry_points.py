@@ -1,4 +1,4 @@
-"""Entry points of the suite's nodes: light, so that Ctrl-C ends them quietly while they load."""
+"""Entry points of nodes: light, so that Ctrl-C ends them quietly while they load."""
 
 from __future__ import annotations
 
@@ -26,6 +26,3 @@ def start(module: str) -> int:
 
 
 kinematics_node = partial(start, "leg_kinematics.nodes.kinematics_node")
-statics_node = partial(start, "leg_statics.nodes.statics_node")
-maps_node = partial(start, "leg_statics.nodes.maps_node")
-designs_node = partial(start, "leg_statics.nodes.designs_node")

@@ -9,6 +9,7 @@ import sys
 
 import pytest
 
+PROGRAM = "from leg_kinematics.nodes.entry_points import start; start('slow_node')"
 SLOW_MODULE = """
 import time
 print("loading", flush=True)
@@ -20,7 +21,11 @@ time.sleep(60.0)
 def test_a_signal_while_a_node_loads_ends_it_without_a_traceback(tmp_path, number):
     (tmp_path / "slow_node.py").write_text(SLOW_MODULE)
     process = subprocess.Popen(
-        [sys.executable, "-c", "from leg_msgs_py.nodes import start; start('slow_node')"],
+        [
+            sys.executable,
+            "-c",
+            "from leg_kinematics.nodes.entry_points import start; start('slow_node')",
+        ],
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -32,8 +37,10 @@ def test_a_signal_while_a_node_loads_ends_it_without_a_traceback(tmp_path, numbe
     assert (process.returncode, output, errors) == (0, "", "")
 
 
-def test_nothing_heavy_is_loaded_before_signals_are_handled():
-    program = "import sys, leg_msgs_py.nodes; print({'numpy', 'rclpy', 'numba'} & {*sys.modules})"
+@pytest.mark.parametrize("package", ["leg_kinematics", "leg_statics"])
+def test_nothing_heavy_is_loaded_before_signals_are_handled(package):
+    module = f"{package}.nodes.entry_points"
+    program = f"import sys, {module}; print({{'numpy', 'rclpy', 'numba'}} & {{*sys.modules}})"
     output = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )

@@ -1,0 +1,42 @@
+"""What `leg_kinematics` offers to those who use it in their own process."""
+
+from leg_kinematics.description import load_robot
+from leg_kinematics.errors import (
+    DescriptionError,
+    GeometryError,
+    LegError,
+    NotSupportedError,
+    ShapeError,
+    UnknownNameError,
+    ValueRangeError,
+)
+from leg_kinematics.mechanism import Joint, Linkage, Mechanism, Posture
+from leg_kinematics.mechanisms.double_rhombus import DoubleRhombus
+from leg_kinematics.mechanisms.parallel_drive import ParallelDrive
+from leg_kinematics.mechanisms.six_bar import SixBar
+from leg_kinematics.mechanisms.theo_jansen import TheoJansen
+from leg_kinematics.robot import Leg, Mount, Robot
+from leg_kinematics.status import Status
+
+__all__ = [
+    "DescriptionError",
+    "DoubleRhombus",
+    "GeometryError",
+    "Joint",
+    "Leg",
+    "LegError",
+    "Linkage",
+    "Mechanism",
+    "Mount",
+    "NotSupportedError",
+    "ParallelDrive",
+    "Posture",
+    "Robot",
+    "ShapeError",
+    "SixBar",
+    "Status",
+    "TheoJansen",
+    "UnknownNameError",
+    "ValueRangeError",
+    "load_robot",
+]

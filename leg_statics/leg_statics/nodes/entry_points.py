@@ -1,0 +1,9 @@
+"""Entry points of the nodes about statics: light, see `leg_kinematics.nodes.entry_points`."""
+
+from functools import partial
+
+from leg_kinematics.nodes.entry_points import start
+
+designs_node = partial(start, "leg_statics.nodes.designs_node")
+maps_node = partial(start, "leg_statics.nodes.maps_node")
+statics_node = partial(start, "leg_statics.nodes.statics_node")
