@@ -399,7 +399,7 @@ class TripodPlanner:
             return self._step_lengths[tripod, ground]
         heights = -np.array(self.gait.heights)
         by_load, by_friction = (
-            self.client.query_step_length_async(
+            self.client.query_step_length.future(
                 TRIPODS[tripod],
                 heights,
                 ground,
@@ -466,7 +466,7 @@ class TripodPlanner:
                 rows = np.flatnonzero([k >= 0 and patches[k].ground == ground for k in under])
                 futures[ground] = (
                     rows,
-                    self.client.query_footholds_async(
+                    self.client.query_footholds.future(
                         leg,
                         seen[:, rows],
                         ground,

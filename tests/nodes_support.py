@@ -2,6 +2,8 @@
 
 import time
 
+from leg_msgs_py.client import SERVICES, LegClient
+from leg_msgs_py.client.questions import Request
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
@@ -18,6 +20,18 @@ def wait_for(condition, timeout=PATIENCE):
         assert time.monotonic() < deadline, f"nothing within {timeout} s"
         time.sleep(0.01)
     return value
+
+
+def ask(client, service, request):
+    """Return the response to a request, even one that the client's methods would not make."""
+    return SERVICES[service].send(client, Request(request, lambda response: response)).wait()
+
+
+def is_served(client, order):
+    """Tell whether the action behind a method of the client is there."""
+    method = vars(LegClient)[order]
+    name = client.name_of(method.server, method.name)
+    return client.caller.action_client(name, method.interface).server_is_ready()
 
 
 def set_parameter(node, server, name, value):

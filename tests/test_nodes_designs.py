@@ -7,7 +7,7 @@ import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import find_executable
-from nodes_support import START_TIMEOUT, wait_for
+from nodes_support import START_TIMEOUT, is_served, wait_for
 
 from leg_kinematics.description import robot_from_document
 from leg_kinematics.documents import Document
@@ -38,8 +38,7 @@ def client(tmp_path_factory):
     )
     try:
         with LegClient(namespace="studio", timeout=20.0) as client:
-            action = client._caller.action_client(*client._search_action)
-            wait_for(action.server_is_ready, START_TIMEOUT)
+            wait_for(lambda: is_served(client, "search_geometry"), START_TIMEOUT)
             client.results = results
             yield client
             assert node.poll() is None
@@ -72,10 +71,10 @@ def test_a_search_finds_designs_and_a_robot(client, tmp_path):
 
 def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_path):
     progress = []
-    work = client.search_geometry_async(LONG, tmp_path / "out", on_progress=progress.append)
+    work = client.search_geometry.future(LONG, tmp_path / "out", on_progress=progress.append)
     wait_for(lambda: progress and progress[-1].evaluated > 20, 60.0)
     assert progress[-1].rate > 0.0
-    waiting = client.search_geometry_async(STUDY, tmp_path / "other")
+    waiting = client.search_geometry.future(STUDY, tmp_path / "other")
     waiting.cancel()
     with pytest.raises(errors.CancelledError) as caught:
         waiting.wait()
@@ -88,7 +87,7 @@ def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_pa
     assert len(partial.best_parameters)
     assert partial.robot
     heard = []
-    again = client.search_geometry_async(LONG, tmp_path / "out", on_progress=heard.append)
+    again = client.search_geometry.future(LONG, tmp_path / "out", on_progress=heard.append)
     wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated, 60.0)
     again.cancel()
     with pytest.raises(errors.CancelledError):

@@ -212,7 +212,7 @@ def test_many_threads_share_a_client(suite):
 
 def test_many_requests_may_be_under_way(suite):
     feet = np.linspace(FOOT, np.add(FOOT, [0.0, 0.03, 0.0]), 300)
-    futures = [suite.client.inverse_kinematics_async("left_front", foot) for foot in feet]
+    futures = [suite.client.inverse_kinematics.future("left_front", foot) for foot in feet]
     joints = [future.wait().joint_positions for future in futures]
     back = suite.client.forward_kinematics("left_front", joints)
     np.testing.assert_allclose(back.positions, feet, atol=1e-9)
@@ -230,10 +230,10 @@ class Planner(Node):
     async def plan(self):
         self.timer.cancel()
         try:
-            feet = await self.client.forward_kinematics_async("left_front", np.zeros((2, 3)))
-            back = await self.client.inverse_kinematics_async("left_front", feet.positions)
+            feet = await self.client.forward_kinematics.future("left_front", np.zeros((2, 3)))
+            back = await self.client.inverse_kinematics.future("left_front", feet.positions)
             self.answers.append(back.joint_positions)
-            await self.client.describe_async("tail")
+            await self.client.describe.future("tail")
         except errors.LegServiceError as error:
             self.answers.append(error)
 
@@ -283,7 +283,7 @@ def test_a_closed_client_says_so(suite):
 
 
 def test_a_cancelled_call_says_so(suite):
-    future = suite.client.legs_async()
+    future = suite.client.legs.future()
     future.cancel()
     with pytest.raises(errors.CancelledError):
         future.wait()
@@ -315,7 +315,7 @@ def test_a_server_that_hangs_is_a_time_out_and_works_again_later(suite):
                 client.inverse_kinematics("left_front", FOOT)
         finally:
             process.send_signal(signal.SIGCONT)
-        client._caller.timeout = 20.0
+        client.caller.timeout = 20.0
         assert client.inverse_kinematics("left_front", FOOT).status == 0
 
 
@@ -331,7 +331,7 @@ def test_a_client_lives_through_a_restart_of_the_nodes():
         for process in nodes.processes.values():
             outputs.append(process.communicate(timeout=10.0)[0].decode())
             assert process.returncode == 0
-        future = client.inverse_kinematics_async("left_front", FOOT)  # nobody is there
+        future = client.inverse_kinematics.future("left_front", FOOT)  # nobody is there
         for name in node_names():
             nodes.start(name)
         np.testing.assert_array_equal(future.wait().joint_positions, wanted)
@@ -431,5 +431,6 @@ def test_the_launch_file_is_valid_and_starts_the_same_nodes():
     nodes = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")["nodes"]
     assert tuple(node["name"] for node in nodes) == node_names()
     for node in nodes:
-        setup = (ROOT / node["package"] / "setup.py").read_text()
-        assert f'"{node["executable"]} = leg_msgs_py.nodes:{node["executable"]}"' in setup
+        package, executable = node["package"], node["executable"]
+        setup = (ROOT / package / "setup.py").read_text()
+        assert f'"{executable} = {package}.nodes.entry_points:{executable}"' in setup

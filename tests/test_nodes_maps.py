@@ -17,7 +17,7 @@ from leg_msgs_py.client import LegClient
 from leg_msgs_py.clouds import from_cloud
 from leg_msgs_py.grounds import Ground
 from node_processes import NodeProcesses
-from nodes_support import MAX_POINTS, START_TIMEOUT, set_parameter, wait_for
+from nodes_support import MAX_POINTS, START_TIMEOUT, ask, is_served, set_parameter, wait_for
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -156,7 +156,7 @@ def test_queries_are_answered_while_a_map_is_computed(suite, hexapod):
     foot = leg.mechanism.initial_posture.foot_position
     wanted = evaluate_footholds(leg.mechanism, leg.effort_limits, foot, Contact(0.4, load=100.0))
     progress = []
-    work = suite.client.compute_index_map_async(LEG, **LONG, on_progress=progress.append)
+    work = suite.client.compute_index_map.future(LEG, **LONG, on_progress=progress.append)
     wait_for(lambda: progress)
     answered = 0
     while not work.done() and answered < 200:
@@ -171,7 +171,7 @@ def test_queries_are_answered_while_a_map_is_computed(suite, hexapod):
 
 def test_a_cancelled_map_gives_what_there_is(suite, hexapod):
     progress = []
-    work = suite.client.compute_index_map_async(
+    work = suite.client.compute_index_map.future(
         LEG, LONG["resolution"], ["rated_friction"], on_progress=progress.append
     )
     wait_for(lambda: progress and progress[-1].fraction > 0.3)
@@ -188,9 +188,9 @@ def test_a_cancelled_map_gives_what_there_is(suite, hexapod):
 
 def test_a_map_that_waits_for_another_can_be_cancelled(suite):
     begun, heard = [], []
-    first = suite.client.compute_index_map_async(LEG, LONG["resolution"], on_progress=begun.append)
+    first = suite.client.compute_index_map.future(LEG, LONG["resolution"], on_progress=begun.append)
     wait_for(lambda: begun)
-    second = suite.client.compute_index_map_async(LEG, 0.05, on_progress=heard.append)
+    second = suite.client.compute_index_map.future(LEG, 0.05, on_progress=heard.append)
     wait_for(lambda: heard)
     assert heard[-1].fraction == 0.0
     second.cancel()
@@ -237,9 +237,9 @@ def test_a_node_that_stops_ends_the_map_under_way():
         NodeProcesses(names=["maps"], namespace="stopping") as nodes,
         LegClient(namespace="stopping", timeout=2.0) as client,
     ):
-        wait_for(client._caller.action_client(*client._map_action).server_is_ready, START_TIMEOUT)
+        wait_for(lambda: is_served(client, "compute_index_map"), START_TIMEOUT)
         progress = []
-        work = client.compute_index_map_async(LEG, 0.008, on_progress=progress.append)
+        work = client.compute_index_map.future(LEG, 0.008, on_progress=progress.append)
         wait_for(lambda: progress)
         started = time.monotonic()
         nodes.processes["maps"].send_signal(signal.SIGINT)
@@ -278,7 +278,7 @@ def test_a_bad_plane_is_refused(suite, case):
     fields, code, words = case
     request = GetIndexMap.Request(**{"leg": LEG, "height": -0.65, "resolution": 0.1, **fields})
     with pytest.raises(errors.LegServiceError) as caught:
-        suite.client._call("get_index_map", request, lambda response: response).wait()
+        ask(suite.client, "get_index_map", request)
     assert caught.value.code == getattr(ErrorCode, code)
     for word in words:
         assert word in caught.value.message
@@ -314,7 +314,7 @@ def test_without_a_node_the_map_ends_in_time():
     with LegClient(namespace="nobody", timeout=0.3) as client:
         with pytest.raises(errors.ServerUnavailableError, match="/nobody/maps/compute_index_map"):
             client.compute_index_map(LEG, 0.1)
-        work = client.compute_index_map_async(LEG, 0.1)
+        work = client.compute_index_map.future(LEG, 0.1)
     with pytest.raises(errors.CancelledError, match="closed"):
         work.wait()
 

@@ -11,7 +11,7 @@ from leg_msgs.srv import QueryFootholds, QueryStepLength
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.grounds import Ground
-from nodes_support import MAX_POINTS, set_parameter
+from nodes_support import MAX_POINTS, ask, set_parameter
 
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.step_length import Criterion, common_step, longest_step
@@ -336,7 +336,7 @@ def test_a_bad_request_is_refused_and_the_next_one_answered(suite, case):
     request = service_type.Request(**fields)
     request.header.frame_id = frame
     with pytest.raises(errors.LegServiceError) as caught:
-        suite.client._call(service, request, lambda response: response).wait()
+        ask(suite.client, service, request)
     assert caught.value.code == getattr(ErrorCode, code)
     assert type(caught.value) is errors.ERRORS[caught.value.code]
     for word in words:
@@ -363,7 +363,7 @@ def test_the_limit_of_the_node_is_a_parameter(suite):
 
 def test_a_request_that_is_left_as_it_is_stands_on_a_ground_without_friction(suite):
     request = QueryFootholds.Request(leg=LEG, positions=array.array("d", P))
-    answer = suite.client._call("query_footholds", request, lambda response: response).wait()
+    answer = ask(suite.client, "query_footholds", request)
     assert answer.friction_coefficient == 0.0
     assert answer.load_capacity == suite.client.query_footholds(LEG, P, 0.0).load_capacity
 

@@ -8,7 +8,7 @@ from leg_msgs.msg import ErrorCode, PointStatus
 from leg_msgs_py import errors
 from leg_msgs_py.client import SERVICES
 from nodes_bad_requests import BAD, P
-from nodes_support import MAX_POINTS, set_parameter
+from nodes_support import MAX_POINTS, ask, set_parameter
 
 from leg_kinematics import Status
 from leg_kinematics.mechanism import geometry_parameters
@@ -261,19 +261,17 @@ def test_as_many_points_as_allowed_are_answered(suite, hexapod):
 
 # --------------------------------------------------------------------------- bad requests
 
-TYPES = {name: kind for services in SERVICES.values() for name, kind in services.items()}
-
 
 @pytest.mark.parametrize("case", BAD.values(), ids=BAD.keys())
 def test_a_bad_request_is_refused_and_the_next_one_answered(suite, hexapod, case):
     service, fields, code, words = case
     fields = {"leg": "left_front", **fields}
     frame = fields.pop("frame", None)
-    request = TYPES[service].Request(**fields)
+    request = SERVICES[service].interface.Request(**fields)
     if frame is not None:
         request.header.frame_id = frame
     with pytest.raises(errors.LegServiceError) as caught:
-        suite.client._call(service, request, lambda response: response).wait()
+        ask(suite.client, service, request)
     assert caught.value.code == getattr(ErrorCode, code)
     assert type(caught.value) is errors.ERRORS[caught.value.code]
     for word in words:

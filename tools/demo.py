@@ -21,9 +21,10 @@ DOMAIN_ID = ros_domain.use_own_domain()  # so that the demo meets no robot; befo
 
 import numpy as np  # noqa: E402
 from leg_msgs.msg import FootholdVerdict  # noqa: E402
+from leg_msgs_py.arrays import FloatArray  # noqa: E402
 from leg_msgs_py.client import LegClient  # noqa: E402
+from leg_msgs_py.client.description import LegDescription  # noqa: E402
 from leg_msgs_py.errors import LegServiceError, ServerUnavailableError  # noqa: E402
-from leg_msgs_py.results import FloatArray, LegDescription  # noqa: E402
 from node_processes import NodeProcesses  # noqa: E402
 from rich.box import SIMPLE_HEAD  # noqa: E402
 from rich.console import Console  # noqa: E402

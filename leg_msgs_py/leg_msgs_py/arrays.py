@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+FloatArray = NDArray[np.float64]
+StatusArray = NDArray[np.uint8]
+
 
 def to_field(values: ArrayLike, dtype: Any = np.float64) -> array.array[Any]:
     """Return an array of any shape as the flat content of a sequence field.

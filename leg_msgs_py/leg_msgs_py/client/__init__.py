@@ -1,5 +1,9 @@
-"""The client for gait planners: numpy arrays in, named tuples out, exceptions for failures."""
+"""The client for gait planners: numpy arrays in, named tuples out, exceptions for failures.
+
+A module for each family of questions says what is asked, what is answered, and how both travel.
+"""
 
 from leg_msgs_py.client.leg_client import SERVICES, LegClient
+from leg_msgs_py.grounds import Ground
 
-__all__ = ["SERVICES", "LegClient"]
+__all__ = ["SERVICES", "Ground", "LegClient"]

@@ -1,0 +1,113 @@
+"""How far the next step may go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from leg_msgs.srv import QueryStepLength
+from leg_msgs_py.arrays import FloatArray, from_field, to_field
+from leg_msgs_py.client.inputs import number, numbers, vector
+from leg_msgs_py.client.questions import Request, question
+from leg_msgs_py.grounds import Ground, ground_message
+from numpy.typing import ArrayLike, NDArray
+
+
+class StepLengths(NamedTuple):
+    """Answer of `query_step_length` for L legs and heights (...,).
+
+    Attributes:
+        legs: Names of the legs (L).
+        lengths: Step length of each leg (L, ...) [m]; 0 where no point is feasible.
+        starts: Rear ends (L, ..., 3) [m]; NaN where there is none.
+        ends: Front ends (L, ..., 3) [m].
+        start_limits: `leg_msgs/FootholdVerdict` just behind the rear ends (L, ...).
+        end_limits: The same just before the front ends (L, ...).
+        load_capacity: Load capacity along the stances (L, ..., P) [N].
+        rated_friction: mu_e along them (L, ..., P).
+        common_lengths: The step that all legs can make together (...,) [m].
+        limiting_leg: Index of the leg with the shortest step (...,).
+        best_height: Flat index of the longest common step; -1 if there is none.
+        friction_coefficient: Friction coefficient that was used.
+    """
+
+    legs: tuple[str, ...]
+    lengths: FloatArray
+    starts: FloatArray
+    ends: FloatArray
+    start_limits: NDArray[np.uint8]
+    end_limits: NDArray[np.uint8]
+    load_capacity: FloatArray
+    rated_friction: FloatArray
+    common_lengths: FloatArray
+    limiting_leg: NDArray[np.int32]
+    best_height: int
+    friction_coefficient: float
+
+
+@question("statics", QueryStepLength)
+def query_step_length(
+    legs: str | Sequence[str],
+    heights: ArrayLike,
+    ground: Ground | str | float,
+    load: float = 0.0,
+    *,
+    lateral_offsets: ArrayLike = (),
+    direction: ArrayLike = (0.0, 0.0, 0.0),
+    moment: ArrayLike = (0.0, 0.0, 0.0),
+    any_direction_moment: float = 0.0,
+    by_rated_friction: bool = False,
+    frame: str = "",
+) -> Request[StepLengths]:
+    """Return how far the next step may go, of each leg and of all together.
+
+    Args:
+        legs: Name of a leg, or names of several; () for all.
+        heights: z of the ground in the frame (...,) [m]; -0.8 if the body is 0.8 m above it.
+        ground: The ground: its name, its friction coefficient, or a `Ground` with a normal.
+        load: Force normal to the ground that each leg has to bear [N].
+        lateral_offsets: Distance of each leg's line from the origin of its own frame, to the
+            right of the walking direction (L,), or one for all [m]; () for none.
+        direction: Walking direction, horizontal (3,) of any length; zero is forward.
+        moment: Moment of the ground on the foot (3,) [N.m]; zero on hard ground.
+        any_direction_moment: Further horizontal moment of unknown direction [N.m].
+        by_rated_friction: Whether a point is feasible where the ground offers the rated
+            friction, whatever the load.
+        frame: Frame of all vectors: "" is the leg's own for one leg, the base for several.
+    """
+    levels = numbers("heights", heights)
+    request = QueryStepLength.Request(
+        legs=[legs] if isinstance(legs, str) else list(legs),
+        heights=to_field(levels),
+        lateral_offsets=to_field(numbers("lateral_offsets", lateral_offsets)),
+        direction=vector("direction", direction),
+        ground=ground_message(ground),
+        required_load=number("load", load),
+        required_moment=vector("moment", moment),
+        any_direction_moment=number("any_direction_moment", any_direction_moment),
+        criterion=QueryStepLength.Request.RATED_FRICTION
+        if by_rated_friction
+        else QueryStepLength.Request.CAPACITY,
+    )
+    request.header.frame_id = frame
+
+    def decode(response: Any) -> StepLengths:
+        batch = (len(response.legs), *levels.shape)
+        profile = (*batch, response.profile_points)
+        return StepLengths(
+            legs=tuple(response.legs),
+            lengths=from_field(response.lengths, batch),
+            starts=from_field(response.starts, (*batch, 3)),
+            ends=from_field(response.ends, (*batch, 3)),
+            start_limits=from_field(response.start_limits, batch, np.uint8),
+            end_limits=from_field(response.end_limits, batch, np.uint8),
+            load_capacity=from_field(response.load_capacity, profile),
+            rated_friction=from_field(response.rated_friction, profile),
+            common_lengths=from_field(response.common_lengths, levels.shape),
+            limiting_leg=from_field(response.limiting_leg, levels.shape, np.int32),
+            best_height=response.best_height,
+            friction_coefficient=response.friction_coefficient,
+        )
+
+    return Request(request, decode)

@@ -1,0 +1,16 @@
+"""How services and actions are named: as their types are, in snake case."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+
+def interface_name(interface: Any) -> str:
+    """Return the name of a service or action below its node's, "query_footholds" of QueryFootholds.
+
+    Args:
+        interface: Its type.
+    """
+    name: str = interface.__name__
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
