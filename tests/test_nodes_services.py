@@ -11,7 +11,7 @@ from nodes_bad_requests import BAD, P
 from nodes_support import MAX_POINTS, ask, set_parameter
 
 from leg_kinematics import Status
-from leg_kinematics.mechanism import geometry_parameters
+from leg_kinematics.geometry import geometry_parameters
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.indices import condition_number, evaluate_indices, supported_indices
 

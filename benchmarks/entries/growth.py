@@ -11,7 +11,6 @@ import numpy as np
 from harness import Row, Settings, Timing, measure, timed_row
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
 
-from leg_kinematics.mechanism import inverse_with_twist
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.footholds import evaluate_footholds
 
@@ -30,7 +29,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     times: dict[str, list[Timing]] = {}
     for count in counts:
         feet = np.resize(few, (count, 3)) if count > BATCH else few[:count]
-        jacobian = inverse_with_twist(mechanism, feet)[1][..., :3, :]
+        jacobian = mechanism.inverse_with_twist(feet)[1][..., :3, :]
         for name, function in (
             ("inverse", lambda feet=feet: mechanism.inverse(feet)),
             ("load_capacity", lambda j=jacobian: load_capacity(j, lower, upper, FRICTION)),

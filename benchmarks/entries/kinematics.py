@@ -9,8 +9,6 @@ from harness import Goal, Row, Settings, measure, measure_beside, missing_row, r
 from peers.pinocchio_leg import PinocchioLeg
 from workload import BATCH, hexapod_leg, neighbours, reachable_positions
 
-from leg_kinematics.mechanism import inverse_with_twist
-
 
 def rows(settings: Settings) -> Iterator[Row]:
     """Yield inverse kinematics, what else the mechanism computes, and the peer."""
@@ -25,7 +23,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     yield timed_row("inverse", ours, Goal(250e-9), batch)
     for name, function in {
         "inverse, mirrored leg": lambda: mirrored.inverse(mirrored_feet),
-        "inverse_with_twist": lambda: inverse_with_twist(mechanism, feet),
+        "inverse_with_twist": lambda: mechanism.inverse_with_twist(feet),
         "forward": lambda: mechanism.forward(posture.joint_positions),
         "jacobian": lambda: mechanism.jacobian(posture),
     }.items():

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from harness import Goal, Row, Settings, measure, timed_row
 from workload import CONTACT, FRICTION, hexapod_leg, reachable_positions
 
-from leg_kinematics.mechanism import inverse_with_twist
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.footholds import evaluate_footholds
 
@@ -37,7 +36,7 @@ def rows(settings: Settings) -> Iterator[Row]:
             lambda: evaluate_footholds(mirrored, leg.effort_limits, mirrored_foot, CONTACT),
             None,
         ),
-        ("inverse_with_twist", lambda: inverse_with_twist(mechanism, foot), None),
+        ("inverse_with_twist", lambda: mechanism.inverse_with_twist(foot), None),
         ("forward", lambda: mechanism.forward(posture.joint_positions), None),
         ("jacobian", lambda: mechanism.jacobian(posture), None),
     ):

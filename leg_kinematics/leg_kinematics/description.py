@@ -44,7 +44,8 @@ from leg_kinematics.documents import (
 )
 from leg_kinematics.errors import DescriptionError, GeometryError, NotSupportedError
 from leg_kinematics.files import existing_path, exists, user_path
-from leg_kinematics.mechanism import Joint, geometry_parameters
+from leg_kinematics.geometry import geometry_parameters
+from leg_kinematics.mechanism import Joint
 from leg_kinematics.mechanisms import MECHANISMS
 from leg_kinematics.mirrored import Mirrored
 from leg_kinematics.robot import Leg, Mount, Robot

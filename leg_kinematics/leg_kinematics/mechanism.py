@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import Field, dataclass, field, fields
-from functools import cached_property
-from itertools import product
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, StatusArray
-from leg_kinematics.errors import GeometryError, UnknownNameError
+from leg_kinematics.errors import NotSupportedError, UnknownNameError
 
-Dimension = Literal["length", "angle", "ratio"]
-SI_UNITS: dict[Dimension, str] = {"length": "m", "angle": "rad", "ratio": "1"}
+POINT_FOOT = ("x", "y", "z")  # task coordinates of a foot that the ground can push
 
 
 @dataclass(frozen=True)
@@ -31,6 +29,11 @@ class Joint:
     type: Literal["revolute", "prismatic"] = "revolute"
 
     @property
+    def dimension(self) -> Literal["angle", "length"]:
+        """What the joint position measures."""
+        return "angle" if self.type == "revolute" else "length"
+
+    @property
     def unit(self) -> str:
         """SI unit of the joint position."""
         return "rad" if self.type == "revolute" else "m"
@@ -39,6 +42,27 @@ class Joint:
     def effort_unit(self) -> str:
         """SI unit of the joint effort."""
         return "N.m" if self.type == "revolute" else "N"
+
+
+@dataclass(frozen=True)
+class Excursion:
+    """How far passive joints have moved from the initial posture, which a limit bounds.
+
+    Often it is that of one joint and has its name; joints that move alike share one, and a ball
+    joint, which has no joint position, has the angle of a cone.
+
+    Attributes:
+        name: Name within the mechanism, e.g. "s1_cone".
+        dimension: "angle" or "length".
+    """
+
+    name: str
+    dimension: Literal["angle", "length"] = "angle"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the excursion."""
+        return "rad" if self.dimension == "angle" else "m"
 
 
 class Posture(NamedTuple):
@@ -72,216 +96,199 @@ class Linkage(NamedTuple):
     bars: tuple[tuple[int, ...], ...]
 
 
-class Mechanism(Protocol):
-    """A leg mechanism: a frozen dataclass of its geometry (SI units) with these members.
+class Mechanism(ABC):
+    """A leg mechanism in SI units: immutable, hashable, picklable.
 
     Leg frame: z up, y the walking direction, x to the side. All arrays follow the one shape rule:
-    any leading batch axes, the same leading axes back. n is the number of actuated joints, t that
-    of the task coordinates: the foot's x, y, z, and for a manipulator its orientation after them.
+    any leading batch axes, the same leading axes back. n is the number of actuated joints, p that
+    of passive ones, e that of excursions, t that of the task coordinates: the foot's x, y, z, and
+    for a manipulator its orientation after them.
+
+    A mechanism defines what is abstract; class attributes serve as properties. It overrides the
+    twist methods where one pass is cheaper than its parts, and the abilities that it has of those
+    that raise a NotSupportedError here.
     """
 
-    name: ClassVar[str]
-    joints: ClassVar[tuple[Joint, ...]]
-    passive_joints: ClassVar[tuple[Joint, ...]]
-    closure_names: ClassVar[tuple[str, ...]]
-    assembly_modes: ClassVar[tuple[str, ...]]
-    task_coordinates: ClassVar[tuple[str, ...]]
-    task_units: ClassVar[tuple[str, ...]]
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name of the kind of mechanism, e.g. "parallel_drive"."""
 
     @property
+    @abstractmethod
+    def joints(self) -> tuple[Joint, ...]:
+        """The actuated joints (n)."""
+
+    @property
+    @abstractmethod
+    def passive_joints(self) -> tuple[Joint, ...]:
+        """The joints without an actuator that have a position, revolute or prismatic (p).
+
+        A universal joint is two of them; a ball joint is none.
+        """
+
+    @property
+    def excursions(self) -> tuple[Excursion, ...]:
+        """What the limits of the passive joints bound (e); each passive joint unless told."""
+        return tuple(Excursion(joint.name, joint.dimension) for joint in self.passive_joints)
+
+    @property
+    @abstractmethod
+    def closure_names(self) -> tuple[str, ...]:
+        """Names of the dependent coordinates that close the loops."""
+
+    @property
+    @abstractmethod
+    def assembly_modes(self) -> tuple[str, ...]:
+        """Names of the branches of the closed chain; the first is the default."""
+
+    @property
+    def task_coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of the foot that the joints control (t)."""
+        return POINT_FOOT
+
+    @property
+    def task_units(self) -> tuple[str, ...]:
+        """SI units of the task coordinates (t)."""
+        return ("m",) * len(POINT_FOOT)
+
+    @property
+    def has_point_foot(self) -> bool:
+        """Whether the foot is a point x, y, z that the ground can push."""
+        return self.task_coordinates == POINT_FOOT
+
+    @property
+    @abstractmethod
     def joint_limits(self) -> FloatArray:
         """Ranges of the actuated joints (n, 2) [rad or m]."""
 
     @property
+    @abstractmethod
     def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints (p, 2) [rad or m]."""
+        """Ranges of the excursions of the passive joints (e, 2) [rad or m]."""
 
     @property
+    @abstractmethod
     def initial_posture(self) -> Posture:
         """The reference posture, from which excursions and assembly modes count."""
 
+    @abstractmethod
     def forward(self, joint_positions: ArrayLike, assembly_mode: str = "") -> Posture:
-        """Solve for the foot: joint positions (..., n) [rad or m] to a `Posture`."""
+        """Solve for the foot.
 
+        Args:
+            joint_positions: Actuated joints (..., n) [rad or m].
+            assembly_mode: One of `assembly_modes`; "" is the first.
+
+        Raises:
+            ShapeError: If the joint positions are not numbers (..., n).
+            UnknownNameError: If there is no such mode.
+        """
+
+    @abstractmethod
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
-        """Solve for the actuators: foot positions (..., t) [m] to a `Posture`."""
+        """Solve for the actuators.
 
+        Args:
+            foot_position: The foot by its task coordinates in the leg frame (..., t) [m].
+            assembly_mode: One of `assembly_modes`; "" is the first.
+
+        Raises:
+            ShapeError: If the foot position is not numbers (..., t).
+            UnknownNameError: If there is no such mode.
+        """
+
+    @abstractmethod
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of v = J q', foot velocity from joint velocities (..., t, n)."""
 
+    @abstractmethod
     def angular_jacobian(self, posture: Posture) -> FloatArray:
         """J_omega of omega = J_omega q', angular velocity of the foot's body (..., 3, n)."""
 
+    @abstractmethod
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
-        """Passive joints as excursions from the initial posture (..., p) [rad or m]."""
+        """Positions of the passive joints (..., p) [rad or m].
 
+        Each is the angle or displacement between the two bodies that the joint connects, continuous
+        where the posture is: angles are those within half a turn of the initial posture's, which
+        are in [-pi, pi). The mechanism tells their zeros and senses.
+        """
+
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
+        """Excursions of the passive joints from the initial posture (..., e) [rad or m]."""
+        rest = self.passive_joint_positions(self.initial_posture)
+        return self.passive_joint_positions(posture) - rest
+
+    @abstractmethod
     def linkage(self, posture: Posture) -> Linkage:
         """Points and bars of the leg in this posture."""
 
+    def twist_jacobian(self, posture: Posture) -> FloatArray:
+        """`jacobian` above `angular_jacobian` (..., t + 3, n): the twist of the foot's body."""
+        return np.concatenate([self.jacobian(posture), self.angular_jacobian(posture)], axis=-2)
 
-def twist_jacobian(mechanism: Mechanism, posture: Posture) -> FloatArray:
-    """Return `jacobian` above `angular_jacobian` (..., t + 3, n): the twist of the foot's body.
+    def inverse_with_twist(
+        self, foot_position: ArrayLike, assembly_mode: str = ""
+    ) -> tuple[Posture, FloatArray]:
+        """`inverse` and `twist_jacobian` of the same points."""
+        posture = self.inverse(foot_position, assembly_mode)
+        return posture, self.twist_jacobian(posture)
 
-    A mechanism may offer it in one pass, as a method of this name.
-    """
-    one_pass = getattr(mechanism, "twist_jacobian", None)
-    if one_pass is not None:
-        result: FloatArray = one_pass(posture)
-        return result
-    parts = mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
-    return np.concatenate(parts, axis=-2)
+    def forward_with_twist(
+        self, joint_positions: ArrayLike, assembly_mode: str = ""
+    ) -> tuple[Posture, FloatArray]:
+        """`forward` and `twist_jacobian` of the same points."""
+        posture = self.forward(joint_positions, assembly_mode)
+        return posture, self.twist_jacobian(posture)
 
+    def offers(self, ability: Callable[..., Any]) -> bool:
+        """Tell whether the mechanism has an optional ability, such as `Mechanism.acceleration`."""
+        return getattr(type(self), ability.__name__) is not ability
 
-def inverse_with_twist(
-    mechanism: Mechanism, foot_position: ArrayLike, assembly_mode: str = ""
-) -> tuple[Posture, FloatArray]:
-    """Return `inverse` and `twist_jacobian` of the same points.
+    def acceleration(
+        self, posture: Posture, joint_velocities: ArrayLike, joint_accelerations: ArrayLike
+    ) -> FloatArray:
+        """Second derivatives of the task coordinates (..., t), an optional ability.
 
-    A mechanism may offer both in one pass, as a method of this name.
-    """
-    one_pass = getattr(mechanism, "inverse_with_twist", None)
-    if one_pass is not None:
-        result: tuple[Posture, FloatArray] = one_pass(foot_position, assembly_mode)
-        return result
-    posture = mechanism.inverse(foot_position, assembly_mode)
-    return posture, twist_jacobian(mechanism, posture)
-
-
-def forward_with_twist(
-    mechanism: Mechanism, joint_positions: ArrayLike, assembly_mode: str = ""
-) -> tuple[Posture, FloatArray]:
-    """Return `forward` and `twist_jacobian` of the same points.
-
-    A mechanism may offer both in one pass, as a method of this name.
-    """
-    one_pass = getattr(mechanism, "forward_with_twist", None)
-    if one_pass is not None:
-        result: tuple[Posture, FloatArray] = one_pass(joint_positions, assembly_mode)
-        return result
-    posture = mechanism.forward(joint_positions, assembly_mode)
-    return posture, twist_jacobian(mechanism, posture)
-
-
-def parameter(doc: str, symbol: str, dimension: Dimension, default: float) -> Any:
-    """Declare a geometry parameter of a mechanism dataclass.
-
-    Args:
-        doc: What it measures.
-        symbol: The paper's symbol.
-        dimension: "length" or "ratio" (must be > 0), or "angle".
-        default: Default value in SI units.
-    """
-    return _parameter(doc, symbol, dimension, default, positive=dimension != "angle")
-
-
-def offset(doc: str, symbol: str, default: float) -> Any:
-    """Declare a geometry parameter that is a signed length (it may be zero or negative)."""
-    return _parameter(doc, symbol, "length", default, positive=False)
-
-
-def _parameter(
-    doc: str, symbol: str, dimension: Dimension, default: float, *, positive: bool
-) -> Any:
-    metadata = {"doc": doc, "symbol": symbol, "dimension": dimension, "positive": positive}
-    return field(default=default, metadata=metadata)
-
-
-def geometry_parameters(mechanism: Any) -> tuple[Field[Any], ...]:
-    """Return the fields of a mechanism (class or instance) that are geometry parameters."""
-    return tuple(f for f in fields(mechanism) if "dimension" in f.metadata)
-
-
-class Dimensioned:
-    """What the dataclasses of the mechanisms share: their fields, checked and as arrays.
-
-    Attributes:
-        joint_ranges: Pairs (lower, upper), one an actuated joint [rad or m].
-        passive_joint_ranges: The same of the passive joints, as excursions.
-    """
-
-    joints: ClassVar[tuple[Joint, ...]]
-    passive_joints: ClassVar[tuple[Joint, ...]]
-    joint_ranges: tuple[tuple[float, float], ...]
-    passive_joint_ranges: tuple[tuple[float, float], ...]
-
-    def check_fields(self) -> None:
-        """Check every field by itself.
+        Args:
+            posture: The leg's posture (...).
+            joint_velocities: Of the actuated joints (..., n) [rad/s or m/s].
+            joint_accelerations: Of the actuated joints (..., n) [rad/s² or m/s²].
 
         Raises:
-            GeometryError: If a parameter is not finite, or not positive although it must be, or a
-                range is reversed, NaN or missing.
+            NotSupportedError: If the mechanism does not tell them.
         """
-        for f in geometry_parameters(self):
-            value = getattr(self, f.name)
-            if not np.isfinite(value):
-                raise GeometryError(
-                    f"{f.name} ({f.metadata['symbol']}) must be finite, got {value}"
-                )
-            if f.metadata["positive"] and value <= 0.0:
-                unit = SI_UNITS[f.metadata["dimension"]]
-                raise GeometryError(
-                    f"{f.name} ({f.metadata['symbol']}) must be > 0 [{unit}], got {value}"
-                )
-        _check_ranges("joint_ranges", self.joint_ranges, self.joints)
-        _check_ranges("passive_joint_ranges", self.passive_joint_ranges, self.passive_joints)
+        raise NotSupportedError(f"mechanism {self.name!r} does not tell accelerations")
 
-    @cached_property
-    def joint_limits(self) -> FloatArray:
-        """Ranges of the actuated joints (n, 2) [rad or m]."""
-        return np.array(self.joint_ranges, dtype=np.float64)
+    def constraint_jacobian(self, posture: Posture) -> FloatArray:
+        """Constraint wrenches of the drive (..., c, 6), force then moment; an optional ability.
 
-    @cached_property
-    def passive_joint_limits(self) -> FloatArray:
-        """Ranges of the passive joints as excursions from the initial posture (p, 2) [rad or m]."""
-        return np.array(self.passive_joint_ranges, dtype=np.float64)
+        Raises:
+            NotSupportedError: If the mechanism does not tell them.
+        """
+        raise NotSupportedError(f"mechanism {self.name!r} does not tell constraint wrenches")
 
-    @cached_property
-    def _geometry(self) -> FloatArray:
-        """Geometry parameters in the order of declaration (g,) [SI]."""
-        return np.array([getattr(self, f.name) for f in geometry_parameters(self)])
+    def planar_jacobian(self, posture: Posture) -> FloatArray:
+        """Jacobian of the foot in the leg's plane (..., 2, 2), an optional ability.
 
+        Rows are the foot's velocity along the walking direction and up in the leg's plane, columns
+        the speeds of the first two actuated joints.
 
-def _check_ranges(name: str, ranges: Any, joints: Sequence[Joint]) -> None:
-    array = np.asarray(ranges, dtype=np.float64)
-    if array.shape != (len(joints), 2):
-        raise GeometryError(
-            f"{name} must be {len(joints)} pairs (lower, upper), got shape {array.shape}"
-        )
-    for joint, (lower, upper) in zip(joints, array, strict=True):
-        if not lower <= upper:
-            raise GeometryError(
-                f"{name} of {joint.name}: lower {lower} must be <= upper {upper} [{joint.unit}]"
-            )
+        Raises:
+            NotSupportedError: If the mechanism has no planar part with two actuators.
+        """
+        raise NotSupportedError(f"mechanism {self.name!r} has no planar part with two actuators")
 
+    def mode_index(self, assembly_mode: str) -> int:
+        """Return the index of an assembly mode; "" is the first one, the default.
 
-def flipped_modes(default: str, parts: Sequence[str]) -> tuple[str, ...]:
-    """Return the default mode and one for each set of parts assembled the other way round."""
-    flips = [
-        "+".join(part for part, flip in zip(parts, bits, strict=True) if flip)
-        for bits in product((False, True), repeat=len(parts))
-    ]
-    return (default, *(f"flipped_{name}" for name in flips[1:]))
-
-
-def mode_signs(mechanism: Mechanism, assembly_mode: str, parts: Sequence[str]) -> FloatArray:
-    """Return -1 for each part (parts,) that a mode of `flipped_modes` flips, +1 for the others.
-
-    Raises:
-        UnknownNameError: If the mechanism has no such mode.
-    """
-    index, last = mode_index(mechanism, assembly_mode), len(parts) - 1
-    return np.array([-1.0 if index >> (last - k) & 1 else 1.0 for k in range(last + 1)])
-
-
-def mode_index(mechanism: Mechanism, assembly_mode: str) -> int:
-    """Return the index of an assembly mode; "" is the first one, the default.
-
-    Raises:
-        UnknownNameError: If the mechanism has no such mode.
-    """
-    if not assembly_mode:
-        return 0
-    try:
-        return mechanism.assembly_modes.index(assembly_mode)
-    except ValueError:
-        raise UnknownNameError("assembly mode", assembly_mode, mechanism.assembly_modes) from None
+        Raises:
+            UnknownNameError: If the mechanism has no such mode.
+        """
+        if not assembly_mode:
+            return 0
+        try:
+            return self.assembly_modes.index(assembly_mode)
+        except ValueError:
+            raise UnknownNameError("assembly mode", assembly_mode, self.assembly_modes) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,21 +11,15 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.mechanism import (
-    Linkage,
-    Mechanism,
-    Posture,
-    forward_with_twist,
-    inverse_with_twist,
-    twist_jacobian,
-)
+from leg_kinematics.mechanism import Excursion, Joint, Linkage, Mechanism, Posture
 
 # Reflection at the plane x = 0: a vector keeps its y and z, an axial vector (rotation, moment)
 # keeps its x.
 VECTOR = np.array([-1.0, 1.0, 1.0])
-AXIAL = np.array([1.0, -1.0, -1.0])
+AXIAL = -VECTOR
+WRENCH = np.concatenate([VECTOR, AXIAL])
 VECTOR_ROWS, AXIAL_ROWS = VECTOR[:, None], AXIAL[:, None]  # of Jacobians
-TWIST_ROWS = np.concatenate([VECTOR_ROWS, AXIAL_ROWS])
+TWIST_ROWS = WRENCH[:, None]
 
 
 def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
@@ -38,11 +33,12 @@ def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
 
 
 @dataclass(frozen=True)
-class Mirrored:
+class Mirrored(Mechanism):
     """A mechanism reflected at x = 0; the leg frame stays right-handed.
 
     Joint positions keep their meaning: an actuator whose axis is parallel to x turns the same way
-    in the mirror image, and stands on the other side.
+    in the mirror image, and stands on the other side. What else a mechanism has beyond the protocol
+    is asked of its `original`.
 
     Attributes:
         original: The mechanism that is reflected.
@@ -56,16 +52,70 @@ class Mirrored:
         Raises:
             NotSupportedError: If the task coordinates are not x, y, z.
         """
-        if tuple(self.original.task_coordinates) != ("x", "y", "z"):
+        if not self.original.has_point_foot:
             raise NotSupportedError(
                 f"mechanism {self.original.name!r} has no point foot and cannot be mirrored"
             )
 
-    def __getattr__(self, name: str) -> Any:
-        """Take what a reflection does not change (names, joints, limits ...) from the original."""
-        if name.startswith("__") or name == "original":
-            raise AttributeError(name)
-        return getattr(self.original, name)
+    # ------------------------------------------------------------- what a reflection keeps
+
+    @property
+    def name(self) -> str:
+        """Name of the kind of mechanism."""
+        return self.original.name
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The actuated joints (n)."""
+        return self.original.joints
+
+    @property
+    def passive_joints(self) -> tuple[Joint, ...]:
+        """The passive joints (p)."""
+        return self.original.passive_joints
+
+    @property
+    def excursions(self) -> tuple[Excursion, ...]:
+        """What the limits of the passive joints bound (e)."""
+        return self.original.excursions
+
+    @property
+    def closure_names(self) -> tuple[str, ...]:
+        """Names of the dependent coordinates that close the loops."""
+        return self.original.closure_names
+
+    @property
+    def assembly_modes(self) -> tuple[str, ...]:
+        """Names of the branches of the closed chain."""
+        return self.original.assembly_modes
+
+    @property
+    def joint_limits(self) -> FloatArray:
+        """Ranges of the actuated joints (n, 2) [rad or m]."""
+        return self.original.joint_limits
+
+    @property
+    def passive_joint_limits(self) -> FloatArray:
+        """Ranges of the excursions of the passive joints (e, 2) [rad or m]."""
+        return self.original.passive_joint_limits
+
+    def offers(self, ability: Callable[..., Any]) -> bool:
+        """Tell whether the mechanism has an optional ability."""
+        return self.original.offers(ability)
+
+    def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Positions of the passive joints about the mirror images of their axes (..., p)."""
+        return self.original.passive_joint_positions(_reflected(posture))
+
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
+        """Excursions of the passive joints (..., e)."""
+        return self.original.passive_joint_excursions(_reflected(posture))
+
+    def planar_jacobian(self, posture: Posture) -> FloatArray:
+        """Jacobian of the foot in the leg's plane (..., 2, 2): forward and up are kept."""
+        return self.original.planar_jacobian(_reflected(posture))
+
+    # ------------------------------------------------------------- what it turns round
 
     @property
     def initial_posture(self) -> Posture:
@@ -79,29 +129,26 @@ class Mirrored:
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the actuators; see `Mechanism.inverse`."""
         foot = as_array("foot_position", foot_position, 3)
-        q, closure, _, status = self.original.inverse(foot * VECTOR, assembly_mode)
-        return Posture(q, closure, foot, status)
+        return _reflected(self.original.inverse(foot * VECTOR, assembly_mode))
 
     def inverse_with_twist(
         self, foot_position: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray]:
-        """`inverse` and `twist_jacobian` in one pass."""
+        """`inverse` and `twist_jacobian` of the same points."""
         foot = as_array("foot_position", foot_position, 3)
-        (q, closure, _, status), twist = inverse_with_twist(
-            self.original, foot * VECTOR, assembly_mode
-        )
-        return Posture(q, closure, foot, status), TWIST_ROWS * twist
+        posture, twist = self.original.inverse_with_twist(foot * VECTOR, assembly_mode)
+        return _reflected(posture), TWIST_ROWS * twist
 
     def forward_with_twist(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray]:
-        """`forward` and `twist_jacobian` in one pass."""
-        posture, twist = forward_with_twist(self.original, joint_positions, assembly_mode)
+        """`forward` and `twist_jacobian` of the same points."""
+        posture, twist = self.original.forward_with_twist(joint_positions, assembly_mode)
         return _reflected(posture), TWIST_ROWS * twist
 
     def twist_jacobian(self, posture: Posture) -> FloatArray:
         """`jacobian` above `angular_jacobian` (..., 6, n)."""
-        return TWIST_ROWS * twist_jacobian(self.original, _reflected(posture))
+        return TWIST_ROWS * self.original.twist_jacobian(_reflected(posture))
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of v = J q' (..., 3, n)."""
@@ -114,22 +161,15 @@ class Mirrored:
     def acceleration(
         self, posture: Posture, joint_velocities: ArrayLike, joint_accelerations: ArrayLike
     ) -> FloatArray:
-        """Acceleration of the foot (..., 3), for mechanisms that offer it."""
-        original: Any = self.original
-        acceleration: FloatArray = original.acceleration(
+        """Acceleration of the foot (..., 3) [m/s²]."""
+        acceleration = self.original.acceleration(
             _reflected(posture), joint_velocities, joint_accelerations
         )
         return VECTOR * acceleration
 
-    def passive_joint_positions(self, posture: Posture) -> FloatArray:
-        """Excursions of the passive joints (..., p)."""
-        return self.original.passive_joint_positions(_reflected(posture))
-
     def constraint_jacobian(self, posture: Posture) -> FloatArray:
         """Constraint wrenches (..., c, 6): force part, then moment part."""
-        original: Any = self.original
-        jacobian: FloatArray = original.constraint_jacobian(_reflected(posture))
-        return np.concatenate([VECTOR, AXIAL]) * jacobian
+        return WRENCH * self.original.constraint_jacobian(_reflected(posture))
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points and bars of the leg in this posture."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from leg_kinematics.conditioning import condition_number
-from leg_kinematics.mechanism import inverse_with_twist
 from leg_kinematics.robot import Robot
 
 
@@ -15,4 +14,4 @@ def warm_up_kinematics(robot: Robot) -> None:
         condition_number(mechanism.jacobian(posture))
         mechanism.angular_jacobian(posture)
         mechanism.passive_joint_positions(posture)
-        inverse_with_twist(mechanism, foot)
+        mechanism.inverse_with_twist(foot)

@@ -9,7 +9,7 @@ import pytest
 
 from leg_kinematics import DescriptionError, Status, UnknownNameError, load_robot
 from leg_kinematics.description import find_robot_file
-from leg_kinematics.mechanism import geometry_parameters
+from leg_kinematics.geometry import geometry_parameters
 
 HEXAPOD = find_robot_file("hexapod")
 

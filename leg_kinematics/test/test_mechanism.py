@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from leg_kinematics import Status, load_robot
-from leg_kinematics.mechanism import forward_with_twist, inverse_with_twist, twist_jacobian
 
 SAME = {"rtol": 1e-12, "atol": 1e-12}
 LEGS = [
@@ -42,17 +41,17 @@ def both_jacobians(mechanism, posture):
 
 
 def test_forward_and_jacobians_in_one_pass_equal_those_one_by_one(mechanism, joint_positions):
-    posture, twist = forward_with_twist(mechanism, joint_positions)
+    posture, twist = mechanism.forward_with_twist(joint_positions)
     wanted = mechanism.forward(joint_positions)
     assert {Status.OK, Status.INVALID_INPUT} <= set(posture.status)
     assert_same_posture(posture, wanted)
     np.testing.assert_allclose(twist, both_jacobians(mechanism, wanted), **SAME)
-    np.testing.assert_allclose(twist_jacobian(mechanism, wanted), twist, **SAME)
+    np.testing.assert_allclose(mechanism.twist_jacobian(wanted), twist, **SAME)
 
 
 def test_inverse_and_jacobians_in_one_pass_equal_those_one_by_one(mechanism, joint_positions):
     feet = mechanism.forward(joint_positions).foot_position
-    posture, twist = inverse_with_twist(mechanism, feet)
+    posture, twist = mechanism.inverse_with_twist(feet)
     wanted = mechanism.inverse(feet)
     assert_same_posture(posture, wanted)
     # one from the sines of a pose, the other from its angles: rounding differs near singularities
@@ -61,5 +60,5 @@ def test_inverse_and_jacobians_in_one_pass_equal_those_one_by_one(mechanism, joi
 
 def test_all_modes_are_solved_in_one_pass_too(mechanism, joint_positions):
     for mode in mechanism.assembly_modes:
-        posture, _ = forward_with_twist(mechanism, joint_positions[:20], mode)
+        posture, _ = mechanism.forward_with_twist(joint_positions[:20], mode)
         assert_same_posture(posture, mechanism.forward(joint_positions[:20], mode))

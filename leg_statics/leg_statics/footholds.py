@@ -32,7 +32,7 @@ from leg_kinematics.kernels.blocks import (
 )
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.mechanism import Mechanism, Posture, inverse_with_twist
+from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 from leg_statics.capacity.planes import plane_capacity
 from leg_statics.capacity.problem import check_effort_limits, check_normals, difference, unit
@@ -201,7 +201,7 @@ def evaluate_footholds(
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
-    posture, twist = inverse_with_twist(mechanism, foot_position)
+    posture, twist = mechanism.inverse_with_twist(foot_position)
     return _judged(mechanism, posture, twist, effort_limits, contact)
 
 

@@ -172,15 +172,15 @@ def _square(mechanism: Mechanism) -> bool:
 
 
 def _spatial_leg(mechanism: Mechanism) -> bool:
-    return _square(mechanism) and len(mechanism.joints) == 3
+    return mechanism.has_point_foot and len(mechanism.joints) == 3
 
 
 def _has_constraints(mechanism: Mechanism) -> bool:
-    return hasattr(mechanism, "constraint_jacobian")
+    return mechanism.offers(Mechanism.constraint_jacobian)
 
 
 def _has_planar_part(mechanism: Mechanism) -> bool:
-    return hasattr(mechanism, "planar_jacobian")
+    return mechanism.offers(Mechanism.planar_jacobian)
 
 
 INDICES: dict[str, Index] = {
@@ -294,8 +294,7 @@ def find_index(name: str) -> Index:
 
 def supported_indices(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the indices that a mechanism has."""
-    original = getattr(mechanism, "original", mechanism)
-    return tuple(name for name, index in INDICES.items() if index.supports(original))
+    return tuple(name for name, index in INDICES.items() if index.supports(mechanism))
 
 
 def evaluate_indices(

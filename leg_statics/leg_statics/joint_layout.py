@@ -58,7 +58,7 @@ def joint_layout(robot: Robot, names: Sequence[str]) -> JointLayout:
     grouped: dict[Mechanism, list[Leg]] = {}
     missing = {}
     for leg in robot.legs.values():
-        if leg.mechanism.task_coordinates != ("x", "y", "z"):
+        if not leg.mechanism.has_point_foot:
             continue  # a manipulator has no foot that bears a load
         absent = tuple(joint for joint in leg.joint_names if joint not in column)
         if not absent:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.mechanism import Mechanism, Posture, twist_jacobian
+from leg_kinematics.mechanism import Mechanism, Posture
 
 
 class Kinematics:
@@ -18,13 +17,13 @@ class Kinematics:
     """
 
     def __init__(self, mechanism: Mechanism, posture: Posture) -> None:
-        self.mechanism: Any = mechanism  # some Jacobians exist for some mechanisms only
+        self.mechanism = mechanism
         self.posture = posture
 
     @cached_property
     def twist_jacobian(self) -> FloatArray:
         """J above J_omega (..., t + 3, n)."""
-        return twist_jacobian(self.mechanism, self.posture)
+        return self.mechanism.twist_jacobian(self.posture)
 
     @property
     def jacobian(self) -> FloatArray:
@@ -39,11 +38,9 @@ class Kinematics:
     @cached_property
     def constraint_jacobian(self) -> FloatArray:
         """Constraint wrenches of the drive (..., c, 6)."""
-        jacobian: FloatArray = self.mechanism.constraint_jacobian(self.posture)
-        return jacobian
+        return self.mechanism.constraint_jacobian(self.posture)
 
     @cached_property
     def planar_jacobian(self) -> FloatArray:
         """Jacobian of the foot in the leg's plane (..., 2, 2)."""
-        jacobian: FloatArray = self.mechanism.planar_jacobian(self.posture)
-        return jacobian
+        return self.mechanism.planar_jacobian(self.posture)

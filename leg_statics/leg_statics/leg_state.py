@@ -13,7 +13,6 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.conditioning import condition_of_point
 from leg_kinematics.kernels.kernel import kernel
-from leg_kinematics.mechanism import forward_with_twist
 from leg_kinematics.status import Status
 from leg_statics.capacity.problem import capacity_of_point
 from leg_statics.efforts import utilisation_of_point
@@ -67,7 +66,7 @@ def leg_states(
         joint_velocities: Joint velocities (..., L, n) [rad/s or m/s]; NaN if not known.
         joint_efforts: Present joint efforts (..., L, n) [N.m or N]; NaN if not known.
     """
-    posture, twist = forward_with_twist(group.mechanism, joint_positions)
+    posture, twist = group.mechanism.forward_with_twist(joint_positions)
     bias = np.zeros(len(group.mechanism.joints))  # the leg's own weight is ignored
     velocity, condition, capacity, mu_e, used = _leg_states(
         twist[..., :3, :],

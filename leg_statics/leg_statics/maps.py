@@ -250,7 +250,7 @@ def _layers(
     contact: Contact | None,
 ) -> tuple[str, ...]:
     """Return the layers asked for, or all that can be computed from what is given."""
-    if len(mechanism.task_coordinates) != 3:
+    if not mechanism.has_point_foot:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has {len(mechanism.task_coordinates)} task "
             "coordinates: index maps need a point foot x, y, z"

@@ -17,7 +17,7 @@ def warm_up_statics(robot: Robot) -> None:
     for leg in robot.legs.values():
         posture = leg.mechanism.initial_posture
         evaluate_indices(leg.mechanism, posture)
-        if tuple(leg.mechanism.task_coordinates) == ("x", "y", "z"):
+        if leg.mechanism.has_point_foot:
             lower, upper = leg.effort_limits.T
             load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
             feet = np.tile(posture.foot_position, (2, 1))

@@ -8,8 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from leg_kinematics import NotSupportedError, ParallelDrive, ShapeError, Status, UnknownNameError
-from leg_kinematics.mirrored import Mirrored
+from leg_kinematics import (
+    DoubleRhombus,
+    Mirrored,
+    NotSupportedError,
+    ParallelDrive,
+    ShapeError,
+    Status,
+    UnknownNameError,
+)
 from leg_statics import indices
 from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 
@@ -143,14 +150,8 @@ def test_points_without_a_posture_have_nan_indices():
 def test_unknown_and_unsupported_indices_are_refused(postures):
     with pytest.raises(UnknownNameError, match=r"manipulability.*condition_number"):
         evaluate_indices(LEG, postures, ["manipulability"])
-
-    class Unconstrained:
-        name = "bare"
-        joints = LEG.joints
-        task_coordinates = LEG.task_coordinates
-
-    with pytest.raises(NotSupportedError, match=r"constraint_force.*bare.*condition_number"):
-        evaluate_indices(Unconstrained(), postures, ["constraint_force"])
+    with pytest.raises(NotSupportedError, match=r"constraint_force.*double_rhombus.*planar_force"):
+        evaluate_indices(DoubleRhombus(), postures, ["constraint_force"])
     with pytest.raises(ShapeError, match="jacobian"):
         indices.rated_friction(np.ones((3, 2)))
 

@@ -23,16 +23,11 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import GeometryError
+from leg_kinematics.geometry import Dimensioned
 from leg_kinematics.kernels.blocks import load, put, store
 from leg_kinematics.kernels.kernel import Kernel, inlined, kernel, scalar
 from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE, within
-from leg_kinematics.mechanism import (
-    Dimensioned,
-    Joint,
-    Linkage,
-    Posture,
-    mode_index,
-)
+from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.mechanisms.dyads import Point, crank_pin, fixed
 from leg_kinematics.status import Status
 
@@ -307,8 +302,6 @@ class CrankLinkage(Dimensioned):
     passive_joints: ClassVar[tuple[Joint, ...]]
     closure_names: ClassVar[tuple[str, ...]]
     assembly_modes: ClassVar[tuple[str, ...]]
-    task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
 
     sides: ClassVar[FloatArray]  # of every assembly mode
     kernels: ClassVar[Kernels]
@@ -372,7 +365,7 @@ class CrankLinkage(Dimensioned):
         return constants
 
     def _sides(self, assembly_mode: str) -> FloatArray:
-        sides: FloatArray = self.sides[mode_index(self, assembly_mode)]  # type: ignore[arg-type]
+        sides: FloatArray = self.sides[self.mode_index(assembly_mode)]
         return sides
 
     def _solve(self, q: FloatArray, sides: FloatArray) -> Any:
@@ -435,7 +428,7 @@ class CrankLinkage(Dimensioned):
             assembly_mode: One of `assembly_modes`; "" is "walking".
         """
         foot = as_array("foot_position", foot_position, 3)
-        mode = mode_index(self, assembly_mode)  # type: ignore[arg-type]
+        mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):  # infinitely far is far enough
             x, y = -foot[..., 1] / self.crank_length, foot[..., 2] / self.crank_length
         lower, upper = _near_brackets(self._curves[mode], x, y, np.zeros(MAX_PASSES))
@@ -460,7 +453,7 @@ class CrankLinkage(Dimensioned):
             The angles in ascending order, NaN beyond the last; k is the largest number of passes
             the foot curve allows, 2 for a simple one.
         """
-        mode = mode_index(self, assembly_mode)  # type: ignore[arg-type]
+        mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):
             x = -as_array("y", y)[..., None] / self.crank_length
         lower, upper, start, end = self._strokes[mode]

@@ -42,18 +42,12 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
+from leg_kinematics.geometry import Dimensioned, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
-from leg_kinematics.mechanism import (
-    Dimensioned,
-    Joint,
-    Linkage,
-    Posture,
-    flipped_modes,
-    mode_signs,
-    parameter,
-)
+from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
@@ -417,8 +411,6 @@ class DoubleRhombus(Dimensioned):
         *("upper_crank_angle", "lower_crank_angle", "side_swing_angle"),
     )
     assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
-    task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
 
     upper_crank_arm: float = parameter("arm O A of the upper crank AOF", "l1", "length", 0.045)
     lower_crank_arm: float = parameter("arm O D of the lower crank DOE", "l5", "length", 0.045)

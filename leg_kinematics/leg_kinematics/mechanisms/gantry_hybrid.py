@@ -38,19 +38,12 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
+from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.scalars import within, wrapped
-from leg_kinematics.mechanism import (
-    Dimensioned,
-    Joint,
-    Linkage,
-    Posture,
-    flipped_modes,
-    mode_signs,
-    offset,
-    parameter,
-)
+from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
 from leg_kinematics.status import Status
 

@@ -32,21 +32,14 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
+from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import arctan2, included_angle, swing_plane, within, wrapped
-from leg_kinematics.mechanism import (
-    Dimensioned,
-    Joint,
-    Linkage,
-    Posture,
-    flipped_modes,
-    mode_signs,
-    offset,
-    parameter,
-)
+from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`
@@ -791,8 +784,6 @@ class ParallelDrive(Dimensioned):
         *("thigh_angle", "link_angle", "swing_angle"),
     )
     assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
-    task_coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    task_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
 
     crank_spacing: float = parameter("distance R_D1 R_D2 of the outer cranks", "d", "length", 0.276)
     center_crank_drop: float = offset("depth of R_D3 below the outer crank axis", "h1", 0.070)

@@ -19,10 +19,12 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.assembly_modes import flipped_modes
+from leg_kinematics.geometry import parameter
 from leg_kinematics.kernels.blocks import BLOCK, get3, load
 from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.mechanism import Joint, flipped_modes, parameter
+from leg_kinematics.mechanism import Joint
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
     CLOSURE,

@@ -12,7 +12,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
 from leg_kinematics.robot import Leg, Mount, Robot
 
-POINT_FOOT = ("x", "y", "z")  # task coordinates of a foot that the ground can push
+XYZ = ("x", "y", "z")  # components of points and vectors, column by column
 NAME_CODES = {"leg": ErrorCode.UNKNOWN_LEG, "ground": ErrorCode.UNKNOWN_GROUND}
 
 
@@ -138,7 +138,7 @@ def find_frame(robot: Robot, leg: Leg, frame_id: str) -> LegFrame:
             f"header.frame_id: unknown frame {frame_id!r}; allowed: '' or {leg.frame!r} (the leg's "
             f"own), {robot.base_frame!r} (the robot's base)"
         )
-    if leg.mechanism.task_coordinates != POINT_FOOT:
+    if not leg.mechanism.has_point_foot:
         raise NotSupportedError(
             f"header.frame_id: {frame_id!r} needs a leg with coordinates x, y, z; {leg.name!r} has "
             f"{', '.join(leg.mechanism.task_coordinates)}: give positions in {leg.frame!r}"

@@ -15,7 +15,8 @@ import numpy as np
 
 from leg_kinematics.arrays import as_array, as_non_negative
 from leg_kinematics.errors import GeometryError, UnknownNameError, ValueRangeError
-from leg_kinematics.mechanism import Mechanism, geometry_parameters
+from leg_kinematics.geometry import geometry_parameters
+from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import Mirrored
 from leg_statics.capacity.problem import check_effort_limits
 from leg_statics.design.averages import (
@@ -67,7 +68,7 @@ def _index_metric(index: Index) -> Metric:
 
 
 def _has_point_foot(mechanism: Mechanism) -> bool:
-    return len(mechanism.task_coordinates) == 3
+    return mechanism.has_point_foot
 
 
 def _moves_in_space(mechanism: Mechanism) -> bool:

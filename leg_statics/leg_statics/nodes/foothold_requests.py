@@ -8,7 +8,7 @@ import numpy as np
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.nodes.requests import POINT_FOOT, check_count, find_frame, read_rows
+from leg_kinematics.nodes.requests import XYZ, check_count, find_frame, read_rows
 from leg_kinematics.robot import Leg, Robot
 from leg_statics.footholds import evaluate_footholds
 from leg_statics.grounds import Grounds
@@ -34,7 +34,7 @@ def fill_footholds(
     frame = find_frame(robot, leg, request.header.frame_id)
     contact = read_contact(grounds, request, frame)
     contact = contact._replace(bias=read_bias(leg, request.bias_efforts))
-    positions = read_rows("positions", request.positions, POINT_FOOT)
+    positions = read_rows("positions", request.positions, XYZ)
     check_count("positions", len(positions), max_points)
     found = evaluate_footholds(
         leg.mechanism, leg.effort_limits, frame.points_to_leg(positions), contact
@@ -65,7 +65,7 @@ def standing_leg(robot: Robot, name: str) -> Leg:
         NotSupportedError: If it does not end in a foot that the ground could push.
     """
     leg = robot.leg(name)
-    if leg.mechanism.task_coordinates != POINT_FOOT:
+    if not leg.mechanism.has_point_foot:
         raise NotSupportedError(
             f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
             f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"

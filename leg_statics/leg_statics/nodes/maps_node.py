@@ -24,7 +24,6 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
 from leg_kinematics.mechanism import Posture
 from leg_kinematics.nodes.requests import (
-    POINT_FOOT,
     LegFrame,
     RequestError,
     check_count,
@@ -208,7 +207,7 @@ class MapsNode(RobotNode):
         Raises:
             LegError: If it cannot be computed.
         """
-        if leg.mechanism.task_coordinates != POINT_FOOT:
+        if not leg.mechanism.has_point_foot:
             raise NotSupportedError(f"leg: {leg.name!r} has no point foot with x, y, z")
         nz, ny, nx = grid_shape(leg.mechanism, request.resolution)
         count = ny * nx * (1 if height is not None else nz)
@@ -286,7 +285,7 @@ class MapsNode(RobotNode):
         header, layer = self.header(self.robot.base_frame), self.value("marker_layer")
         note = f"no workspace drawn: {leg.name}"
         self.health.notes.pop(note, None)
-        if not layer or leg.mechanism.task_coordinates != POINT_FOOT:
+        if not layer or not leg.mechanism.has_point_foot:
             return no_workspace_marker(header, leg)
         try:
             key = MapKey.of(

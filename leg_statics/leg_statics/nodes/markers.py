@@ -67,7 +67,7 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
     foot = posture.foot_position[:3]
     cone: FloatArray = np.empty((0, 3))
     polytope: FloatArray = np.empty((0, 3))
-    if posture.status == Status.OK and mechanism.task_coordinates == ("x", "y", "z"):
+    if posture.status == Status.OK and mechanism.has_point_foot:
         cone = foot + _cone_lines(scene.friction)
         jacobian = mechanism.jacobian(posture)
         if jacobian.shape == (3, 3):

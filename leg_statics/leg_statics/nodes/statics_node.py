@@ -26,9 +26,10 @@ from std_msgs.msg import Header
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import UnknownNameError
-from leg_kinematics.mechanism import SI_UNITS, Posture, geometry_parameters
+from leg_kinematics.geometry import SI_UNITS, geometry_parameters
+from leg_kinematics.mechanism import Posture
 from leg_kinematics.nodes.requests import (
-    POINT_FOOT,
+    XYZ,
     RequestError,
     check_count,
     find_frame,
@@ -272,7 +273,7 @@ def _vectors(field: str, values: Any, count: int) -> FloatArray:
             f"{field}: got {len(values)} values; allowed: 3 (one vector for all points) or "
             f"{3 * count} (x, y, z of each of {count} points)"
         )
-    return np.broadcast_to(read_rows(field, values, POINT_FOOT), (count, 3))
+    return np.broadcast_to(read_rows(field, values, XYZ), (count, 3))
 
 
 def _joint_rows(leg: Leg, names: Sequence[str]) -> list[int]:

@@ -12,7 +12,6 @@ from leg_msgs_py.arrays import from_field, to_field
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.nodes.requests import (
-    POINT_FOOT,
     BaseFrame,
     LegFrame,
     RequestError,
@@ -76,7 +75,7 @@ def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:
     """
     names = [leg.name for leg in legs]
     for leg in legs:
-        if leg.mechanism.task_coordinates != POINT_FOOT:
+        if not leg.mechanism.has_point_foot:
             raise NotSupportedError(f"legs: {leg.name!r} has no point foot with x, y, z")
         if names.count(leg.name) > 1:
             raise RequestError(f"legs: {leg.name!r} is given twice; allowed: once each")

@@ -12,7 +12,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from leg_kinematics.description import UNITS
 from leg_kinematics.documents import Document
-from leg_kinematics.mechanism import geometry_parameters
+from leg_kinematics.geometry import geometry_parameters
 from leg_kinematics.mechanisms import MECHANISMS
 
 

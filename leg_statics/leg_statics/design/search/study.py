@@ -43,7 +43,8 @@ from leg_kinematics.description import UNITS, find_robot_file, robot_from_docume
 from leg_kinematics.documents import NAME, NUMBER, Document, mapping_schema
 from leg_kinematics.errors import LegError, UnknownNameError
 from leg_kinematics.files import user_path
-from leg_kinematics.mechanism import SI_UNITS, Mechanism, geometry_parameters
+from leg_kinematics.geometry import SI_UNITS, geometry_parameters
+from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_statics.design.designs import (
     METRICS,
