@@ -1,12 +1,15 @@
 """Publishes numbered joint states of legs at a steady rate, one topic a leg, and tells how many.
 
 Arguments: rate [Hz], duration [s], topics. The number stands in the stamp; a warm-up has number 0.
-Every other topic is best effort, the others are reliable. It ends with its standard input.
+Every other topic is best effort, the others are reliable. When all is sent it tells so, and goes on
+with messages of the number `LAST`, by which a reader finds out what it has lost before, until its
+standard input ends.
 """
 
 from __future__ import annotations
 
 import json
+import select
 import sys
 import time
 
@@ -17,12 +20,14 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
+LAST = 2**31 - 1
 WARM_UP_MESSAGES, WARM_UP_PERIOD = 30, 0.01
-TIMEOUT = 30.0  # to be listened to [s]
+LAST_PERIOD = 0.05  # [s]
+TIMEOUT = 600.0  # to be listened to [s]
 
 
 def main() -> None:
-    """Wait for listeners, warm up, send, and print what was done as JSON."""
+    """Wait for listeners, warm up, send, and print what was done as lines of JSON."""
     rate, seconds, topics = float(sys.argv[1]), float(sys.argv[2]), sys.argv[3:]
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node("numbered_sender", enable_rosout=False, start_parameter_services=False)
@@ -60,7 +65,11 @@ def main() -> None:
         send(k + 1)
     elapsed = time.monotonic() - start
     print(json.dumps({"sent": count, "rate": count / elapsed}), flush=True)
-    sys.stdin.read()
+    published = WARM_UP_MESSAGES + count
+    while not select.select([sys.stdin], [], [], LAST_PERIOD)[0]:
+        send(LAST)
+        published += 1
+    print(json.dumps({"published": published}))
     rclpy.shutdown()
 
 

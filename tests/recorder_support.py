@@ -5,17 +5,20 @@ import os
 import signal
 import subprocess
 import sys
-from collections import defaultdict
-from contextlib import contextmanager
+import time
+from collections import Counter, defaultdict
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from leg_msgs_py.recordings.bags import Bag
+from leg_msgs_py.recordings.bags import Bag, BagError
 from node_processes import find_executable
+from nodes_support import START_TIMEOUT
+from numbered_sender import LAST
 
 SENDER = Path(__file__).with_name("numbered_sender.py")
 LEGS = tuple(f"/leg_{k}/joint_states" for k in range(6))
 BEST_EFFORT, RELIABLE = LEGS[::2], LEGS[1::2]  # what the sender makes of them
-STOP_TIMEOUT = 30.0  # [s]
+LOOK_PERIOD = 0.5  # at a recording in the making [s]
 
 
 class RecordProcess:
@@ -46,7 +49,7 @@ class RecordProcess:
 
     def wait(self):
         """Wait until it ends, and return its output."""
-        output, self.errors = self.process.communicate(timeout=STOP_TIMEOUT)
+        output, self.errors = self.process.communicate(timeout=START_TIMEOUT)
         return output
 
     def size(self):
@@ -73,7 +76,7 @@ def sender(rate, seconds, topics):
         yield process
     finally:
         process.stdin.close()
-        process.wait(STOP_TIMEOUT)
+        process.wait(START_TIMEOUT)
         process.stdout.close()
 
 
@@ -82,15 +85,47 @@ def report_of(process):
     return json.loads(process.stdout.readline())
 
 
-def numbers(folder):
-    """Return the numbers of the recorded joint states by topic; not those of the warm-up."""
+def published_by(process):
+    """End a sender, and return how many messages it has published on each topic."""
+    process.stdin.close()
+    return json.loads(process.stdout.readline())["published"]
+
+
+def counts(folder):
+    """Return how many messages are recorded by topic, also while the recording is being made."""
+    try:
+        return Bag(folder).counts
+    except BagError:  # nothing yet
+        return Counter()
+
+
+def all_numbers(folder):
+    """Return the numbers of the recorded joint states by topic."""
     found = defaultdict(list)
-    for message in Bag(folder).messages():
-        if message.topic in LEGS:
-            number = int.from_bytes(message.data[4:8], "little")
-            if number:
-                found[message.topic].append(number)
+    with suppress(BagError):  # nothing yet
+        for message in Bag(folder).messages(LEGS):
+            found[message.topic].append(int.from_bytes(message.data[4:8], "little"))
     return dict(found)
+
+
+def numbers(folder):
+    """Return the same without those of the warm-up and of the end."""
+    return {
+        topic: [number for number in found if 0 < number < LAST]
+        for topic, found in all_numbers(folder).items()
+    }
+
+
+def wait_until_recorded(record, topics=LEGS):
+    """Wait until the last number is recorded: all before it is, too, or is counted as lost."""
+
+    def are_recorded():
+        found = all_numbers(record.folder)
+        return all(LAST in found.get(topic, ()) for topic in topics)
+
+    while not are_recorded():
+        assert record.process.poll() is None, record.wait()
+        time.sleep(LOOK_PERIOD)
 
 
 def missing(folder, sent):

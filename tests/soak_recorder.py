@@ -13,7 +13,14 @@ from leg_msgs_py.client import LegClient
 from leg_msgs_py.recordings.bags import Bag
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, wait_for
-from recorder_support import LEGS, RecordProcess, missing, report_of, sender
+from recorder_support import (
+    LEGS,
+    RecordProcess,
+    missing,
+    report_of,
+    sender,
+    wait_until_recorded,
+)
 
 RATE, SECONDS = 1000.0, 60.0
 SUITE_SENDER = Path(__file__).parent.parent / "benchmarks" / "children" / "sender.py"
@@ -22,6 +29,7 @@ SUITE_SENDER = Path(__file__).parent.parent / "benchmarks" / "children" / "sende
 def test_six_topics_of_a_leg_each(tmp_path):
     with RecordProcess(tmp_path / "soak") as record, sender(RATE, SECONDS, LEGS) as sending:
         told = report_of(sending)
+        wait_until_recorded(record)
         memory = record.memory()
         print(f"\nsent {told}, recorder's memory {memory:.0f} MiB\n{record.stop()}")
     assert missing(tmp_path / "soak", told["sent"]) == {}

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections import namedtuple
+from types import SimpleNamespace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -17,8 +18,7 @@ from leg_msgs_py.recordings.definitions import UnknownTypeError, message_class, 
 from leg_msgs_py.recordings.durable_bag import DurableBag, RecordingError
 from leg_msgs_py.recordings.record import main
 from leg_msgs_py.recordings.recorder import matching_qos, recorded_qos
-from nodes_support import wait_for
-from numbered_sender import WARM_UP_MESSAGES
+from nodes_support import START_TIMEOUT, wait_for
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.serialization import deserialize_message, serialize_message
 from recorder_support import (
@@ -26,14 +26,18 @@ from recorder_support import (
     LEGS,
     RELIABLE,
     RecordProcess,
+    counts,
     missing,
     numbers,
+    published_by,
     report_of,
     sender,
+    wait_until_recorded,
 )
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from ruamel.yaml import YAML
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from stereo_msgs.msg import DisparityImage
 
@@ -92,15 +96,15 @@ def test_a_recording_without_messages_is_whole(tmp_path):
         assert list(reader.messages()) == []
 
 
-def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path):
+def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr(durable_bag, "WRITE_PERIOD", 600.0)  # nothing is written before the end
+    fitting = 100_000 // (len(TEXT) + durable_bag.MESSAGE_OVERHEAD)
     with DurableBag(tmp_path / "fast", queue_size=100_000) as bag:
         topic = bag.add_topic("/text", STRING, [])
-        for k in range(500):  # within one period of the writer: it takes 1150 bytes for each
+        for k in range(500):
             bag.put(topic, k, TEXT)
-            assert bag.waiting <= 100_000
-    assert topic.dropped > 0
-    assert topic.written + topic.dropped == 500
-    assert Bag(tmp_path / "fast").counts["/text"] == topic.written
+    assert (topic.written, topic.dropped) == (fitting, 500 - fitting)
+    assert Bag(tmp_path / "fast").counts["/text"] == fitting
 
 
 def test_a_folder_that_exists_or_cannot_be_made_is_told(tmp_path):
@@ -114,9 +118,10 @@ def test_a_folder_that_exists_or_cannot_be_made_is_told(tmp_path):
 def test_a_disk_that_gets_full_ends_the_recording_which_is_whole(tmp_path, monkeypatch):
     usage = namedtuple("usage", "free")
     monkeypatch.setattr(durable_bag.shutil, "disk_usage", lambda path: usage(2**20))
-    bag = DurableBag(tmp_path / "walk").__enter__()
+    bag = DurableBag(tmp_path / "walk")
     topic = bag.add_topic("/text", STRING, [])
     bag.put(topic, 1, TEXT)
+    bag.__enter__()
     wait_for(lambda: bag.failure)
     bag.put(topic, 2, TEXT)
     with pytest.raises(RecordingError, match=r"is full: 1 MiB left; what was recorded is whole"):
@@ -148,7 +153,7 @@ def test_what_was_written_before_the_disk_failed_is_kept(tmp_path):
         [sys.executable, "-c", WRITE_TOO_MUCH, tmp_path / "walk"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=START_TIMEOUT,
     )
     assert done.stderr == ""
     assert done.stdout.startswith(f"True cannot write {tmp_path / 'walk'}: File too large; all but")
@@ -164,23 +169,30 @@ def recording_legs(folder):
     return RecordProcess(folder / "walk", "--topics", "/leg_*", "/diagnostics")
 
 
-def assert_counted(lacking, output):
-    """Check that the command counts all messages that lack as lost; some of the warm-up may be."""
+def assert_recorded_or_counted(folder, sent, published, output):
+    """Check that what is not recorded is counted as lost, and nothing else.
+
+    On a busy machine the middleware loses some; that it loses none otherwise shows `make soak`.
+    """
     told = re.findall(r"(/\S+) .*\n +(\d+) lost by the middleware", output)
     lost = {topic: int(count) for topic, count in told}
-    for topic, count in lacking.items():
-        assert count <= lost[topic] <= count + WARM_UP_MESSAGES, output
+    recorded, lacking = counts(folder), missing(folder, sent)
+    for topic in LEGS:
+        *_, count = lacking.get(topic, (0,))
+        assert count <= lost.get(topic, 0) <= published - recorded[topic], output
 
 
-def test_nothing_is_lost_at_100_hz_for_six_legs(tmp_path):
+def test_a_recording_of_six_legs_is_whole_and_tells_its_health(tmp_path):
+    folder = tmp_path / "walk"
     with recording_legs(tmp_path) as record, sender(100.0, 2.0, LEGS) as sending:
         sent = report_of(sending)["sent"]
+        wait_until_recorded(record)
+        wait_for(lambda: counts(folder)["/diagnostics"])
         output = record.stop()
         assert record.process.returncode == 0
-    assert missing(tmp_path / "walk", sent) == {}, output
+        assert_recorded_or_counted(folder, sent, published_by(sending), output)
     assert "dropped:" not in output
-    assert "lost by" not in output
-    bag = Bag(tmp_path / "walk")
+    bag = Bag(folder)
     assert (bag.damages, bag.expected) == ({}, bag.counts.total())
     assert bag.topics[BEST_EFFORT[0]].qos[0].reliability == QosReliability.BEST_EFFORT
     assert bag.topics[RELIABLE[0]].qos[0].reliability == QosReliability.RELIABLE
@@ -191,47 +203,73 @@ def test_nothing_is_lost_at_100_hz_for_six_legs(tmp_path):
         for status in deserialize_message(message.data, DiagnosticArray).status
         if status.name == "/leg_recorder: recording"
     )
-    assert status.level == DiagnosticStatus.OK
     values = {value.key: value.value for value in status.values}
-    assert values["dropped messages"] == values["messages lost by the middleware"] == "0"
+    assert values["dropped messages"] == "0"
+    is_well = values["messages lost by the middleware"] == "0"
+    assert status.level == (DiagnosticStatus.OK if is_well else DiagnosticStatus.WARN)
 
 
 def test_every_message_of_1_khz_is_recorded_or_counted_as_lost(tmp_path):
-    """On a busy machine the middleware loses some; a reliable topic's publisher keeps a second."""
     with recording_legs(tmp_path) as record, sender(1000.0, 2.0, LEGS) as sending:
         sent = report_of(sending)["sent"]
+        wait_until_recorded(record)
         output = record.stop()
+        assert_recorded_or_counted(tmp_path / "walk", sent, published_by(sending), output)
     assert "dropped:" not in output
-    lacking = {topic: count for topic, (*_, count) in missing(tmp_path / "walk", sent).items()}
-    assert_counted(lacking, output)
-    for reliable, best_effort in zip(RELIABLE, BEST_EFFORT, strict=True):
-        assert lacking.get(reliable, 0) <= lacking.get(best_effort, 0)
 
 
-def test_a_kill_loses_less_than_a_second(tmp_path):
+def test_what_is_recorded_is_on_the_disk_in_less_than_a_second(tmp_path, monkeypatch):
+    clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now)
+    monkeypatch.setattr(durable_bag, "time", clock)
+    with DurableBag(tmp_path / "walk") as bag:
+        topic = bag.add_topic("/text", STRING, [])
+        bag.put(topic, 1, TEXT)
+        wait_for(lambda: topic.written == 1)
+        assert not counts(tmp_path / "walk")
+        clock.now += 1.0 - durable_bag.WRITE_PERIOD
+        wait_for(lambda: counts(tmp_path / "walk")["/text"] == 1)
+
+
+def test_a_kill_loses_nothing_that_is_on_the_disk(tmp_path):
+    folder = tmp_path / "walk"
     with recording_legs(tmp_path) as record, sender(500.0, 2.0, LEGS[:1]) as sending:
-        wait_for(lambda: record.size() > 100_000)
+        wait_for(lambda: counts(folder)[LEGS[0]])
+        kept = list(Bag(folder).messages())
         record.stop(signal.SIGKILL)
-        killed = time.time_ns()
         report_of(sending)
-    bag = Bag(tmp_path / "walk")
+    bag = Bag(folder)
     assert bag.damages.keys() == {"walk.mcap"}
-    (found,) = numbers(tmp_path / "walk").values()
-    assert found == [*range(1, len(found) + 1)]
-    assert killed - 10**9 < bag.end < killed
+    found = list(bag.messages())
+    assert found[: len(kept)] == kept
+    assert [message.time for message in found] == sorted(message.time for message in found)
 
 
-def test_what_the_middleware_loses_is_counted(tmp_path):
-    with recording_legs(tmp_path) as record, sender(1000.0, 2.0, LEGS[:1]) as sending:
-        wait_for(lambda: record.size() > 50_000)
+def test_what_the_middleware_loses_is_counted(tmp_path, node):
+    folder = tmp_path / "walk"
+    publisher = node.create_publisher(JointState, LEGS[0], qos_profile_sensor_data)
+    message = JointState()
+
+    def send():
+        message.header.stamp.sec += 1
+        publisher.publish(message)
+        return message.header.stamp.sec
+
+    def last():
+        return max(numbers(folder).get(LEGS[0], [0]))
+
+    with recording_legs(tmp_path) as record:
+        wait_for(lambda: send() and last())
         record.process.send_signal(signal.SIGSTOP)
-        time.sleep(1.0)  # what overflows meanwhile is lost
+        for _ in range(10_000):  # more than is kept for a process that does not listen
+            flood = send()
         record.process.send_signal(signal.SIGCONT)
-        sent = report_of(sending)["sent"]
+        wait_for(lambda: send() and last() > flood)
         output = record.stop()
-    (found,) = numbers(tmp_path / "walk").values()
-    assert len(found) < sent
-    assert_counted({LEGS[0]: sent - len(found)}, output)
+    node.destroy_publisher(publisher)
+    (found,) = numbers(folder).values()
+    (lost,) = map(int, re.findall(r"(\d+) lost by the middleware", output))
+    lacking = len({*range(min(found), max(found))} - {*found})
+    assert 0 < lacking <= lost <= message.header.stamp.sec - len(found)
 
 
 @pytest.fixture(scope="module")
@@ -294,7 +332,7 @@ def test_what_cannot_be_recorded_is_told(tmp_path, node):
 def test_a_recording_ends_after_its_duration(tmp_path):
     arguments = ("--duration", "0.2", "--topics", "/of/nobody")
     with RecordProcess(tmp_path / "walk", *arguments) as record:
-        assert record.wait().startswith(f"{tmp_path / 'walk'}: 0 messages in 0.")
+        assert re.match(rf"{tmp_path / 'walk'}: 0 messages in \d+\.\d s, ", record.wait())
         assert record.process.returncode == 0
     assert (tmp_path / "walk" / "metadata.yaml").exists()
 
