@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,20 +17,27 @@ from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.clouds import from_cloud
 from leg_msgs_py.grounds import Ground
-from node_processes import NodeProcesses
-from nodes_support import MAX_POINTS, START_TIMEOUT, ask, is_served, set_parameter, wait_for
+from nodes_support import (
+    MAX_POINTS,
+    PATIENCE,
+    START_TIMEOUT,
+    ask,
+    is_served,
+    set_parameter,
+    wait_for,
+)
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from leg_kinematics import Status
-from leg_statics.footholds import Contact, evaluate_footholds
-from leg_statics.maps import plane_map, supported_layers, volume_map
+from leg_statics.footholds import Contact
+from leg_statics.maps import grid_shape, plane_map, supported_layers, volume_map
 
 LEG = "left_front"
 SLOPE = (0.1, 0.2, 1.0)
 COARSE = 0.04  # m
-LONG = {"resolution": 0.008, "layers": ["condition_number", "constraint_force", "load_capacity"]}
+GATED_NODE = Path(__file__).with_name("nodes_gated.py")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -118,22 +126,13 @@ def test_new_effort_limits_change_the_capacity_layer(suite, hexapod):
 
 def test_a_whole_workspace_equals_the_library(suite, hexapod):
     leg = hexapod.legs[LEG]
-    progress = []
-    answer = suite.client.compute_index_map(
-        LEG, COARSE, ground="cement", on_progress=progress.append
-    )
+    answer = suite.client.compute_index_map(LEG, COARSE, ground="cement")
     points, values = points_inside(whole_map(leg, COARSE, contact=Contact(0.4)))
     assert answer.layers == supported_layers(leg.mechanism)
     assert answer.fraction == 1.0
     assert answer.frame == leg.frame
     np.testing.assert_allclose(answer.positions, points, atol=1e-6)
     np.testing.assert_allclose(answer.values, values, rtol=1e-6)
-    last = progress[-1]
-    assert last.fraction == 1.0
-    for name, best in zip(last.layers, last.best, strict=True):
-        column = values[:, last.layers.index(name)]
-        high = name in ("unit_effort_capacity", "load_capacity")
-        assert best == pytest.approx(column.max() if high else column.min(), rel=1e-9)
 
 
 def test_the_base_frame_is_the_leg_frame_moved_by_the_mount(suite, hexapod):
@@ -151,100 +150,165 @@ def test_the_base_frame_is_the_leg_frame_moved_by_the_mount(suite, hexapod):
     np.testing.assert_allclose(base.values, own.values, rtol=1e-5)
 
 
-def test_queries_are_answered_while_a_map_is_computed(suite, hexapod):
+# --------------------------------------------------------------------------- work under way
+
+
+class GatedMaps:
+    """A maps node of its own that computes maps only as far as it is let, and its client."""
+
+    def __init__(self, namespace):
+        self.process = subprocess.Popen(
+            [sys.executable, GATED_NODE, "--ros-args", "-r", f"__ns:=/{namespace}"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.client = LegClient(namespace=namespace, timeout=PATIENCE)
+        self.orders = []
+
+    def __enter__(self):
+        wait_for(self.is_there, START_TIMEOUT)
+        return self
+
+    def __exit__(self, *_):
+        self.client.close()
+        self.process.kill()
+        self.process.communicate()
+
+    def is_there(self):
+        return is_served(self.client, "compute_index_map")
+
+    def let(self, planes):
+        """Let so many planes pass from now on."""
+        self.process.stdin.write(f"{planes}\n")
+        self.process.stdin.flush()
+        assert self.process.stdout.readline() == f"{planes}\n"
+
+    def order(self, resolution):
+        """Order a map; return the work and its progress, of which something has been heard."""
+        progress = []
+        work = self.client.compute_index_map.future(
+            LEG, resolution, ["rated_friction"], on_progress=progress.append
+        )
+        self.orders.append(work)
+        wait_for(lambda: progress)
+        return work, progress
+
+
+@pytest.fixture(scope="module")
+def gated_node():
+    with GatedMaps("gated") as gated:
+        yield gated
+
+
+@pytest.fixture
+def gated(gated_node):
+    """The gated node, with nothing to do and the gate closed."""
+    yield gated_node
+    for work in gated_node.orders:
+        work.cancel()
+    gated_node.let(0)
+
+
+def planes_of(hexapod, resolution):
+    return grid_shape(hexapod.legs[LEG].mechanism, resolution)[0]
+
+
+def test_progress_tells_the_best_so_far(gated, hexapod):
     leg = hexapod.legs[LEG]
-    foot = leg.mechanism.initial_posture.foot_position
-    wanted = evaluate_footholds(leg.mechanism, leg.effort_limits, foot, Contact(0.4, load=100.0))
-    progress = []
-    work = suite.client.compute_index_map.future(LEG, **LONG, on_progress=progress.append)
-    wait_for(lambda: progress)
-    answered = 0
-    while not work.done() and answered < 200:
-        answer = suite.client.query_footholds(LEG, foot, "cement", 100.0)
-        assert answer.load_capacity == pytest.approx(float(wanted.load_capacity))
-        plane = suite.client.index_map("right_rear", -0.65, 0.1, ["condition_number"])
-        assert np.isfinite(plane.values).any()
-        answered += 1
-    assert answered > 5
+    *_, whole = volume_map(leg.mechanism, COARSE, layers=["rated_friction"])
+    planes = len(whole.z) // 2
+    work, progress = gated.order(COARSE)
+    gated.let(planes)
+    wait_for(lambda: progress[-1].fraction == planes / len(whole.z))
+    assert progress[-1].layers == ("rated_friction",)
+    assert progress[-1].best[0] == np.nanmin(whole.values[:planes])
+    assert progress[-1].remaining > 0.0
+    gated.let(len(whole.z) - planes)
     assert work.wait().fraction == 1.0
 
 
-def test_a_cancelled_map_gives_what_there_is(suite, hexapod):
-    progress = []
-    work = suite.client.compute_index_map.future(
-        LEG, LONG["resolution"], ["rated_friction"], on_progress=progress.append
-    )
-    wait_for(lambda: progress and progress[-1].fraction > 0.3)
-    assert progress[-1].remaining > 0.0
+def test_queries_are_answered_while_a_map_is_computed(gated, hexapod):
+    work, progress = gated.order(0.03)
+    for k in range(1, 6):
+        gated.let(1)
+        plane = gated.client.index_map("right_rear", -0.65, 0.1, ["condition_number"])
+        assert np.isfinite(plane.values).any()
+        wait_for(lambda k=k: progress[-1].fraction == k / planes_of(hexapod, 0.03))
+    assert not work.done()
+    gated.let(planes_of(hexapod, 0.03))
+    assert work.wait().fraction == 1.0
+
+
+def test_a_cancelled_map_gives_what_there_is(gated, hexapod):
+    planes = planes_of(hexapod, 0.02)
+    work, progress = gated.order(0.02)
+    gated.let(planes // 2)
+    wait_for(lambda: progress[-1].fraction == planes // 2 / planes)
     work.cancel()
     with pytest.raises(errors.CancelledError, match="cancelled by the caller") as caught:
         work.wait()
     partial = caught.value.partial
-    assert 0.3 < partial.fraction < 1.0
+    assert partial.fraction == (planes // 2 + 1) / planes  # the plane under way is the last one
     assert len(partial.positions)
     posture = hexapod.legs[LEG].mechanism.inverse(partial.positions[::50])
     assert np.mean(posture.status == Status.OK) > 0.95  # float32 moves points across the border
 
 
-def test_a_map_that_waits_for_another_can_be_cancelled(suite):
-    begun, heard = [], []
-    first = suite.client.compute_index_map.future(LEG, LONG["resolution"], on_progress=begun.append)
-    wait_for(lambda: begun)
-    second = suite.client.compute_index_map.future(LEG, 0.05, on_progress=heard.append)
-    wait_for(lambda: heard)
+def test_a_map_that_waits_for_another_can_be_cancelled(gated):
+    first, _ = gated.order(0.05)
+    second, heard = gated.order(0.06)
     assert heard[-1].fraction == 0.0
     second.cancel()
     with pytest.raises(errors.CancelledError) as caught:
         second.wait()
     assert len(caught.value.partial.positions) == 0
+    assert not first.done()
     first.cancel()
     with pytest.raises(errors.CancelledError):
         first.wait()
 
 
-def test_what_the_progress_callback_raises_ends_the_work(suite):
+def test_what_the_progress_callback_raises_ends_the_work(gated):
     def give_up(progress):
         raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):
-        suite.client.compute_index_map(LEG, LONG["resolution"], on_progress=give_up)
-    assert suite.client.compute_index_map(LEG, 0.1).fraction == 1.0
+        gated.client.compute_index_map(LEG, 0.07, on_progress=give_up)
+    gated.let(1000)
+    assert gated.client.compute_index_map(LEG, 0.1).fraction == 1.0
 
 
 DYING = """
 from leg_msgs_py.client import LegClient
-with LegClient(timeout=30.0) as client:
+with LegClient(namespace="gated", timeout=600.0) as client:
     def tell(progress):
         print(progress.fraction, flush=True)
 
-    client.compute_index_map("right_rear", 0.012, on_progress=tell)
+    client.compute_index_map("right_rear", 0.08, on_progress=tell)
 """
 
 
-def test_a_client_that_dies_leaves_the_node_alive(suite):
+def test_a_client_that_dies_leaves_the_node_alive(gated):
     client = subprocess.Popen([sys.executable, "-c", DYING], stdout=subprocess.PIPE)
-    assert client.stdout.readline()
+    assert client.stdout.readline() == b"0.0\n"
     os.kill(client.pid, signal.SIGKILL)
     client.wait()
     client.stdout.close()
-    assert suite.client.index_map(LEG, -0.65, 0.1).status.size
-    assert suite.client.compute_index_map(LEG, 0.1).fraction == 1.0
-    assert suite.nodes.ended() == {}
+    assert gated.client.index_map(LEG, -0.65, 0.1).status.size
+    gated.let(1000)  # the map of the dead one, and another
+    assert gated.client.compute_index_map(LEG, 0.09).fraction == 1.0
+    assert gated.process.poll() is None
 
 
 def test_a_node_that_stops_ends_the_map_under_way():
-    with (
-        NodeProcesses(names=["maps"], namespace="stopping") as nodes,
-        LegClient(namespace="stopping", timeout=2.0) as client,
-    ):
-        wait_for(lambda: is_served(client, "compute_index_map"), START_TIMEOUT)
-        progress = []
-        work = client.compute_index_map.future(LEG, 0.008, on_progress=progress.append)
-        wait_for(lambda: progress)
-        started = time.monotonic()
-        nodes.processes["maps"].send_signal(signal.SIGINT)
-        assert nodes.processes["maps"].wait(10.0) == 0
-        assert time.monotonic() - started < 5.0
+    with GatedMaps("stopping") as stopping:
+        work, _ = stopping.order(COARSE)
+        stopping.process.send_signal(signal.SIGINT)
+        assert stopping.process.wait(PATIENCE) == 0
+        wait_for(lambda: not stopping.is_there())
+        stopping.client.caller.timeout = 0.5
         with pytest.raises(errors.ServerUnavailableError, match="compute_index_map"):
             work.wait()
 
