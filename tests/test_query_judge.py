@@ -204,7 +204,7 @@ def test_recorded_answers_equal_direct_calls_of_the_library(recorded):
     )
     np.testing.assert_array_equal(response.verdict, wanted.verdict)
     np.testing.assert_allclose(response.load_capacity, wanted.load_capacity, rtol=1e-12)
-    np.testing.assert_allclose(response.joint_efforts, wanted.efforts.ravel(), rtol=1e-12)
+    np.testing.assert_allclose(response.joint_efforts, wanted.joint_efforts.ravel(), rtol=1e-12)
 
 
 # --------------------------------------------------------------------------- what is not so

@@ -139,7 +139,7 @@ def parts_of_footholds(
 
     def evaluate() -> Any:
         found = evaluate_footholds(leg.mechanism, leg.effort_limits, feet, CONTACT)
-        return found, found.ranking()
+        return found, found.ranking
 
     mathematics = measure(evaluate, settings)
     found, ranking = evaluate()

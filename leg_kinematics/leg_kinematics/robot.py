@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array
-from leg_kinematics.errors import UnknownNameError
+from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.errors import ShapeError, UnknownNameError
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import Mirrored
 
@@ -65,6 +65,28 @@ class Leg:
     frame: str
     joint_names: tuple[str, ...]
     effort_limits: FloatArray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, effort_limits: ArrayLike = (-np.inf, np.inf)) -> Leg:
+        """Return a leg by itself: a mechanism with the limits of its actuators, on no body.
+
+        Its base frame is its own, and its joints have the mechanism's names.
+
+        Args:
+            mechanism: The mechanism.
+            effort_limits: Lower (≤ 0) and upper (≥ 0) effort of each actuator (n, 2), or one pair
+                for all [N.m or N]; by default none limits.
+
+        Raises:
+            ShapeError: If there is not one pair of limits an actuator.
+        """
+        joints = tuple(joint.name for joint in mechanism.joints)
+        limits = as_matching("effort_limits", effort_limits, (2,), (len(joints),))
+        if limits.ndim > 2:
+            raise ShapeError(f"effort_limits must have shape (n, 2), got {limits.shape}")
+        mount = Mount(np.zeros(3), np.eye(3))
+        rows = np.broadcast_to(limits, (len(joints), 2)).copy()
+        return cls(mechanism.name, mechanism.name, mechanism, mount, mechanism.name, joints, rows)
 
     @property
     def mirrored(self) -> bool:

@@ -82,11 +82,19 @@ def utilisation_of_point(
     for k in range(len(efforts)):
         if math.isnan(efforts[k]):
             return math.nan, -1
-        limit = upper[k] if efforts[k] > 0.0 else lower[k]
-        share = abs(efforts[k]) / abs(limit) if efforts[k] != 0.0 else 0.0
+        share = share_of_limits(efforts[k], 0.0, lower[k], upper[k])
         if share > worst:
             worst, joint = share, k
     return worst, joint
+
+
+@inlined
+def share_of_limits(effort: float, reserve: float, lower: float, upper: float) -> float:
+    """Return the share of its limits that a joint uses when its effort may vary by a reserve."""
+    highest, lowest = effort + reserve, effort - reserve
+    above = highest / abs(upper) if highest > 0.0 else 0.0
+    below = -lowest / abs(lower) if lowest < 0.0 else 0.0
+    return below if below > above else above
 
 
 @kernel("(n),(n,k)->(),()", "f8[:], f8[:,:], f8[:], i4[:]")

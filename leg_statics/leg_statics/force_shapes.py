@@ -7,8 +7,9 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.arrays import FloatArray, as_array, as_vectors
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
+from leg_statics.capacity.problem import effort_room
 
 # Corners of the box of joint efforts, as choices of lower (0) or upper (1), and its edges.
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -19,28 +20,36 @@ EDGES = tuple(
 )
 
 
-def force_polytope(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
+def force_polytope(
+    jacobian: ArrayLike, effort_limits: ArrayLike, bias_efforts: ArrayLike = 0.0
+) -> FloatArray:
     """Corners of the set of ground reactions that the actuators can hold (8, 3) [N].
 
-    F = -J^-T tau maps the box of the efforts to a parallelepiped with the edges `EDGES`.
+    F = J^-T e maps the room that the limits leave for e = Jᵀ F to a parallelepiped with the edges
+    `EDGES`.
 
     Args:
         jacobian: Jacobian of the foot (3, 3).
         effort_limits: Lower and upper effort of each actuator (3, 2) [N.m or N].
+        bias_efforts: Efforts that the actuators exert anyway (3,) or one for all [N.m or N].
 
     Returns:
         NaN at a singularity, where the set is not bounded.
     """
     j = as_array("jacobian", jacobian, 3, 3)
     limits = as_array("effort_limits", effort_limits, 3, 2)
-    efforts = np.take_along_axis(limits.T, CORNERS, axis=0)
+    bias = as_vectors("bias_efforts", bias_efforts, 3)
+    up, down = effort_room(limits[:, 0], limits[:, 1], bias, 0.0)
+    efforts = np.take_along_axis(np.stack([up, -down]), CORNERS, axis=0)
     if not np.isfinite(j).all() or np.linalg.cond(j) > 1e12:
         return np.full((len(CORNERS), 3), np.nan)
-    corners: FloatArray = -np.linalg.solve(j.T, efforts.T).T
+    corners: FloatArray = np.linalg.solve(j.T, efforts.T).T
     return corners
 
 
-def force_polygon(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
+def force_polygon(
+    jacobian: ArrayLike, effort_limits: ArrayLike, bias_efforts: ArrayLike = 0.0
+) -> FloatArray:
     """Corners of the plane ground reactions that the actuators can hold (k, 2) [N], in order.
 
     Only those count that push the foot up. A force beyond any use, along which the structure alone
@@ -48,7 +57,9 @@ def force_polygon(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
 
     Args:
         jacobian: The two rows of J of the plane's directions, the vertical one last (2, n).
-        effort_limits: Lower (< 0) and upper (> 0) effort of each actuator (n, 2) [N.m or N].
+        effort_limits: Lower and upper effort of each actuator (n, 2) [N.m or N].
+        bias_efforts: Efforts that the actuators exert anyway (n,) or one for all, between the
+            limits [N.m or N].
 
     Raises:
         NotSupportedError: If there are fewer than three actuators: the structure alone holds
@@ -59,13 +70,13 @@ def force_polygon(jacobian: ArrayLike, effort_limits: ArrayLike) -> FloatArray:
     limits = as_array("effort_limits", effort_limits, j.shape[-1], 2)
     if len(limits) < 3:
         raise NotSupportedError("a leg with fewer than three actuators has too few for forces")
-    lower, upper = limits.T
-    if not np.all((lower < 0.0) & (upper > 0.0)):
-        raise ValueRangeError("drawing forces needs effort limits with lower < 0 < upper")
+    bias = as_vectors("bias_efforts", bias_efforts, len(limits))
+    up, down = effort_room(limits[:, 0], limits[:, 1], bias, 0.0)
+    if not np.all((up > 0.0) & (down > 0.0)):
+        raise ValueRangeError("drawing forces needs effort limits with lower < bias < upper")
     from scipy.spatial import HalfspaceIntersection  # slow to import
 
-    normals = np.concatenate([-j.T, j.T])  # the efforts are -J^T F
-    room = np.concatenate([upper, -lower])
+    normals, room = np.concatenate([j.T, -j.T]), np.concatenate([up, down])
     largest = 1e3 * np.max(room) / np.max(np.abs(j))
     frame = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     distances = np.concatenate([room, [largest, largest, largest, 0.0]])

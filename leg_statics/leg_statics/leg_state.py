@@ -14,13 +14,12 @@ from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.conditioning import condition_of_point
 from leg_kinematics.kernels.kernel import kernel
 from leg_kinematics.status import Status
-from leg_statics.capacity.problem import capacity_of_point
+from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation_of_point
 from leg_statics.indices import force_slopes
 from leg_statics.joint_layout import LegGroup
 
 OK = int(Status.OK)
-LEVEL = np.array([0.0, 0.0, 1.0])
 
 
 class LegStates(NamedTuple):
@@ -67,17 +66,10 @@ def leg_states(
         joint_efforts: Present joint efforts (..., L, n) [N.m or N]; NaN if not known.
     """
     posture, twist = group.mechanism.forward_with_twist(joint_positions)
-    bias = np.zeros(len(group.mechanism.joints))  # the leg's own weight is ignored
-    velocity, condition, capacity, mu_e, used = _leg_states(
-        twist[..., :3, :],
-        posture.status,
-        group.lower,
-        group.upper,
-        bias,
-        friction,
-        LEVEL,
-        joint_velocities,
-        joint_efforts,
+    jacobian = twist[..., :3, :]
+    borne = load_capacity(jacobian, group.lower, group.upper, friction)  # the leg has no weight
+    velocity, condition, mu_e, used = _leg_states(
+        jacobian, posture.status, group.lower, group.upper, joint_velocities, joint_efforts
     )
     return LegStates(
         legs=group.legs,
@@ -86,42 +78,24 @@ def leg_states(
         foot_position=group.signs * posture.foot_position,
         foot_velocity=group.signs * velocity,
         condition_number=condition,
-        load_capacity=capacity,
+        load_capacity=np.where(posture.status == Status.OK, borne.capacity, np.nan),
         rated_friction=mu_e,
         utilisation=used,
     )
 
 
 @kernel(
-    "(d,n),(),(n),(n),(n),(),(d),(n),(n)->(d),(),(),(),()",
-    "f8[:,:], u1, f8[:], f8[:], f8[:], f8, f8[:], f8[:], f8[:],f8[:], f8[:], f8[:], f8[:], f8[:]",
+    "(d,n),(),(n),(n),(n),(n)->(d),(),(),()",
+    "f8[:,:], u1, f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]",
 )
-def _leg_states(
-    jacobian,
-    status,
-    lower,
-    upper,
-    bias,
-    friction,
-    normal,
-    rates,
-    efforts,
-    velocity,
-    condition,
-    capacity,
-    mu_e,
-    used,
-):
+def _leg_states(jacobian, status, lower, upper, rates, efforts, velocity, condition, mu_e, used):
     """One leg without reflection; what is reflected is its velocity only."""
     for i in range(3):
         velocity[i] = 0.0
         for k in range(len(rates)):
             velocity[i] += jacobian[i, k] * rates[k]
     used[0], _ = utilisation_of_point(efforts, lower, upper)
-    condition[0], capacity[0], mu_e[0] = math.nan, math.nan, math.nan
-    if status != OK:
-        return
-    capacity[0] = capacity_of_point(jacobian, lower, upper, bias, friction, normal)
-    if len(rates) == 3:
+    condition[0], mu_e[0] = math.nan, math.nan
+    if status == OK and len(rates) == 3:
         condition[0] = condition_of_point(jacobian)
         mu_e[0] = abs(force_slopes(jacobian)[1])

@@ -164,7 +164,7 @@ def test_capacity_and_status_equal_those_of_an_interior_point_solver(kind):
     for _ in range(300):
         jacobian, lower, upper, mu, normal, bias = random_case(rng, kind)
         status, value = reference_capacity(jacobian, lower, upper, mu, normal, bias)
-        result = load_capacity(jacobian, lower, upper, mu, normal=normal, bias=bias)
+        result = load_capacity(jacobian, lower, upper, mu, normal=normal, bias_efforts=bias)
         if status is None:
             unsolved += 1
             continue
@@ -255,13 +255,13 @@ def test_powerless_joint_that_every_force_loads_leaves_no_capacity():
 
 def test_bias_beyond_a_limit_is_carried_by_a_load_that_relieves_the_joint():
     jacobian = np.array([[0.0], [0.0], [1.0]])
-    result = load_capacity(jacobian, [-1.0], [1.0], 0.5, bias=[3.0])
+    result = load_capacity(jacobian, [-1.0], [1.0], 0.5, bias_efforts=[3.0])
     assert (result.status, result.capacity) == (BOUNDED, 4.0)
-    assert load_capacity(jacobian, [-1.0], [1.0], 0.5, bias=[-3.0]).status == INFEASIBLE
+    assert load_capacity(jacobian, [-1.0], [1.0], 0.5, bias_efforts=[-3.0]).status == INFEASIBLE
 
 
 def test_bias_beyond_a_limit_that_no_load_relieves_is_infeasible():
-    result = load_capacity(np.zeros((3, 1)), [-1.0], [1.0], 0.5, bias=[3.0])
+    result = load_capacity(np.zeros((3, 1)), [-1.0], [1.0], 0.5, bias_efforts=[3.0])
     assert result.status == INFEASIBLE
     assert np.isnan(result.capacity)
     assert np.all(np.isnan(result.force))
@@ -312,7 +312,7 @@ def test_not_finite_elements_spoil_only_their_own_point():
     np.testing.assert_array_equal(result.status, wanted)
     np.testing.assert_array_equal(np.isnan(result.capacity), [False, True, True, False])
     bias = [np.nan, 0.0, 0.0]
-    assert load_capacity(LEG, -LIMITS, LIMITS, 0.5, bias=bias).status == INVALID_INPUT
+    assert load_capacity(LEG, -LIMITS, LIMITS, 0.5, bias_efforts=bias).status == INVALID_INPUT
 
 
 # --- laws ---------------------------------------------------------------------------------------
@@ -327,7 +327,7 @@ matrices = st.integers(1, 5).flatmap(lambda n: hnp.arrays(float, (3, n), element
 def test_the_force_is_admissible_and_attains_the_capacity(matrix, down, up, mu, side, bias):
     normal = np.array([side, 1.0, 2.0]) / np.linalg.norm([side, 1.0, 2.0])
     ones = np.ones(matrix.shape[1])
-    result = load_capacity(matrix, -down * ones, up * ones, mu, normal=normal, bias=bias)
+    result = load_capacity(matrix, -down * ones, up * ones, mu, normal=normal, bias_efforts=bias)
     if result.status != BOUNDED:
         return
     force = result.force
@@ -349,7 +349,7 @@ def test_the_force_is_admissible_and_attains_the_capacity(matrix, down, up, mu, 
 )
 def test_any_numbers_give_a_named_outcome_and_never_an_exception(jacobian, limits, mu, bias):
     lower, upper = -np.minimum(limits[0], 1e308), np.minimum(limits[1], 1e308)
-    result = load_capacity(jacobian, lower, upper, mu, bias=bias)
+    result = load_capacity(jacobian, lower, upper, mu, bias_efforts=bias)
     bounded = result.status == BOUNDED
     assert np.all(np.isfinite(result.capacity[bounded]))
     assert np.all(np.isfinite(result.force[bounded]))
@@ -403,9 +403,9 @@ def test_a_batch_equals_a_loop_over_single_points():
     cases = [random_case(rng, "bias") for _ in range(300)]
     cases = [case for case in cases if case[0].shape[1] == 3]
     batch = [np.stack([np.asarray(case[k]) for case in cases]) for k in range(6)]
-    together = load_capacity(*batch[:4], normal=batch[4], bias=batch[5])
+    together = load_capacity(*batch[:4], normal=batch[4], bias_efforts=batch[5])
     for k, case in enumerate(cases):
-        single = load_capacity(*case[:4], normal=case[4], bias=case[5])
+        single = load_capacity(*case[:4], normal=case[4], bias_efforts=case[5])
         for name, value in single._asdict().items():
             np.testing.assert_array_equal(getattr(together, name)[k], value)
 
@@ -428,7 +428,7 @@ def test_leading_axes_broadcast():
         (ShapeError, "effort_lower", {"effort_lower": [-1.0, -1.0]}),
         (ShapeError, "effort_upper", {"effort_upper": "strong"}),
         (ShapeError, "friction", {"jacobian": np.zeros((2, 3, 3)), "friction": [0.1, 0.2, 0.3]}),
-        (ShapeError, "bias", {"bias": [0.0, 0.0]}),
+        (ShapeError, "bias_efforts", {"bias_efforts": [0.0, 0.0]}),
         (ShapeError, "normal", {"normal": [0.0, 1.0]}),
         (ValueRangeError, "friction", {"friction": -0.1}),
         (ValueRangeError, "friction", {"friction": np.nan}),

@@ -27,8 +27,8 @@ CONTACTS = {
     "inclined": Contact(0.6, normal=NORMAL, load=150.0),
     "smooth": Contact(0.05, load=150.0),
     "soft": Contact(0.5, load=150.0, moment=MOMENT),
-    "any moment": Contact(0.5, load=150.0, any_moment=4.0),
-    "weighted": Contact(0.5, load=150.0, bias=BIAS),
+    "any moment": Contact(0.5, load=150.0, any_direction_moment=4.0),
+    "weighted": Contact(0.5, load=150.0, bias_efforts=BIAS),
     "heavy": Contact(0.4, load=400.0),
 }
 every_contact = pytest.mark.parametrize("contact", CONTACTS.values(), ids=CONTACTS)
@@ -59,11 +59,11 @@ def test_the_force_of_a_feasible_candidate_is_admissible(contact):
     assert np.all(sideways <= contact.friction * pressed * (1 + 1e-9))
     expected = joint_efforts(
         LEG.jacobian(posture)[good], LEG.angular_jacobian(posture)[good], force, contact.moment
-    ) + np.asarray(contact.bias)
-    efforts = footholds.efforts[good]
+    ) + np.asarray(contact.bias_efforts)
+    efforts = footholds.joint_efforts[good]
     np.testing.assert_allclose(efforts, expected, rtol=1e-9, atol=1e-9)
     j_omega = LEG.angular_jacobian(posture)[good]
-    reserve = contact.any_moment * np.hypot(j_omega[:, 0], j_omega[:, 1])
+    reserve = contact.any_direction_moment * np.hypot(j_omega[:, 0], j_omega[:, 1])
     share = np.maximum((efforts + reserve) / LIMITS[:, 1], (efforts - reserve) / LIMITS[:, 0])
     np.testing.assert_allclose(footholds.utilisation[good], share.max(axis=1), rtol=1e-9)
     np.testing.assert_array_equal(footholds.limiting_joint[good], share.argmax(axis=1))
@@ -80,8 +80,8 @@ def test_a_verdict_of_friction_or_effort_is_confirmed_by_a_linear_programme(cont
     for verdict in (Verdict.FRICTION, Verdict.EFFORT):
         for k in np.flatnonzero(footholds.verdict == verdict)[:40]:
             idle = joint_efforts(0 * jacobian[k], j_omega[k], np.zeros(3), contact.moment)
-            idle = idle + np.asarray(contact.bias)
-            reserve = contact.any_moment * np.hypot(j_omega[k, 0], j_omega[k, 1])
+            idle = idle + np.asarray(contact.bias_efforts)
+            reserve = contact.any_direction_moment * np.hypot(j_omega[k, 0], j_omega[k, 1])
             lower, upper = LIMITS[:, 0] + reserve, LIMITS[:, 1] - reserve
             result = linprog(
                 -normal,
@@ -105,18 +105,18 @@ def test_each_verdict_occurs():
 
 
 def test_capacity_is_that_of_the_jacobian():
-    contact = Contact(0.4, normal=NORMAL, load=10.0, bias=BIAS)
+    contact = Contact(0.4, normal=NORMAL, load=10.0, bias_efforts=BIAS)
     footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
     ok = footholds.posture.status == Status.OK
     direct = load_capacity(
-        LEG.jacobian(footholds.posture), *LIMITS.T, 0.4, normal=NORMAL, bias=BIAS
+        LEG.jacobian(footholds.posture), *LIMITS.T, 0.4, normal=NORMAL, bias_efforts=BIAS
     )
     np.testing.assert_allclose(footholds.load_capacity[ok], direct.capacity[ok], rtol=1e-12)
 
 
 def test_a_moment_of_unknown_direction_costs_at_least_as_much_as_any_known_one():
     size = 5.0
-    worst = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, any_moment=size))
+    worst = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, any_direction_moment=size))
     ok = worst.posture.status == Status.OK
     for angle in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
         moment = size * np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -128,8 +128,8 @@ def test_a_moment_of_unknown_direction_costs_at_least_as_much_as_any_known_one()
 
 def test_a_leg_that_cannot_be_held_carries_nothing():
     for contact in (
-        Contact(0.4, bias=(0.0, -61.0, 0.0)),
-        Contact(0.4, any_moment=1e6),
+        Contact(0.4, bias_efforts=(0.0, -61.0, 0.0)),
+        Contact(0.4, any_direction_moment=1e6),
         Contact(0.4, moment=(1e6, 0.0, 0.0)),
     ):
         footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
@@ -141,12 +141,12 @@ def test_a_leg_that_cannot_be_held_carries_nothing():
 
 def test_ranking_lists_feasible_candidates_by_capacity():
     footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"])
-    order = footholds.ranking()
+    order = footholds.ranking
     assert len(order) == footholds.feasible.sum()
     assert footholds.feasible[order].all()
     assert np.all(np.diff(footholds.load_capacity[order]) <= 0.0)
     best = int(np.nanargmax(np.where(footholds.feasible, footholds.load_capacity, np.nan)))
-    assert order[0] == best
+    assert order[0] == footholds.best == best
 
 
 def test_no_load_is_feasible_wherever_the_posture_is_ok():
@@ -204,10 +204,10 @@ def test_a_contact_whose_array_changed_is_read_anew():
 def test_numbers_have_a_column_for_each_result():
     footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["soft"])
     results = [
-        *(footholds.load_capacity, footholds.rated_friction, footholds.rated_friction_full),
-        *(footholds.friction_margin, footholds.utilisation, footholds.limiting_joint),
+        *(footholds.rated_friction, footholds.rated_friction_full, footholds.friction_margin),
+        *(footholds.utilisation, footholds.limiting_joint, footholds.load_capacity),
     ]
-    columns = np.column_stack([*results, footholds.force, footholds.efforts])
+    columns = np.column_stack([*results, footholds.force, footholds.joint_efforts])
     np.testing.assert_array_equal(footholds.numbers, columns)
     one = evaluate_footholds(LEG, LIMITS, CANDIDATES[0], CONTACTS["soft"])
     assert isinstance(one.load_capacity, float)
@@ -222,12 +222,12 @@ def test_numbers_have_a_column_for_each_result():
         ({"load": -1.0}, "load"),
         ({"load": np.nan}, "load"),
         ({"load": np.inf}, "load"),
-        ({"any_moment": -1.0}, "any_moment"),
-        ({"any_moment": np.inf}, "any_moment"),
+        ({"any_direction_moment": -1.0}, "any_direction_moment"),
+        ({"any_direction_moment": np.inf}, "any_direction_moment"),
         ({"moment": (0.0, np.nan, 0.0)}, "moment"),
         ({"normal": (0.0, 0.0, 0.0)}, "normal"),
         ({"normal": (0.0, np.nan, 1.0)}, "normal"),
-        ({"bias": (0.0, np.inf, 0.0)}, "bias"),
+        ({"bias_efforts": (0.0, np.inf, 0.0)}, "bias_efforts"),
     ],
 )
 def test_a_value_out_of_range_is_named(change, named):
@@ -241,7 +241,7 @@ def test_a_value_out_of_range_is_named(change, named):
         ({"friction": [0.1, 0.2]}, "friction"),
         ({"moment": (0.0, 1.0)}, "moment"),
         ({"normal": (0.0, 1.0)}, "normal"),
-        ({"bias": (0.0, 1.0)}, "bias"),
+        ({"bias_efforts": (0.0, 1.0)}, "bias_efforts"),
         ({"load": "heavy"}, "load"),
     ],
 )
@@ -257,7 +257,8 @@ def test_a_wrong_shape_is_named(change, named):
 def test_no_candidates_give_no_answers():
     footholds = evaluate_footholds(LEG, LIMITS, np.empty((0, 3)), CONTACTS["level"])
     assert footholds.verdict.shape == (0,)
-    assert footholds.ranking().shape == (0,)
+    assert footholds.ranking.shape == (0,)
+    assert footholds.best == -1
 
 
 @settings(max_examples=200, deadline=None)
@@ -279,15 +280,15 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
         normal=random.normal(size=(count, 3)) + np.array([0.0, 0.0, 4.0]),
         load=random.uniform(0.0, 400.0, count),
         moment=random.uniform(-3.0, 3.0, (count, 3)),
-        any_moment=random.uniform(0.0, 2.0, count),
-        bias=random.uniform(-3.0, 3.0, (count, 3)),
+        any_direction_moment=random.uniform(0.0, 2.0, count),
+        bias_efforts=random.uniform(-3.0, 3.0, (count, 3)),
     )
     together = evaluate_footholds(LEG, LIMITS, feet, contact)
     for k in range(count):
         alone = evaluate_footholds(LEG, LIMITS, feet[k], Contact(*(field[k] for field in contact)))
         for name in ("verdict", "limiting_joint"):
             assert getattr(alone, name) == getattr(together, name)[k]
-        for name in ("load_capacity", "force", "efforts", "utilisation", "friction_margin"):
+        for name in ("load_capacity", "force", "joint_efforts", "utilisation", "friction_margin"):
             np.testing.assert_allclose(
                 getattr(alone, name), getattr(together, name)[k], rtol=1e-12, atol=1e-12
             )
@@ -299,7 +300,7 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
         Contact(friction=[0.4, -0.1]),
         Contact(friction=0.4, normal=[[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]),
         Contact(friction=0.4, load=[1.0, np.nan]),
-        Contact(friction=0.4, any_moment=[0.0, np.inf]),
+        Contact(friction=0.4, any_direction_moment=[0.0, np.inf]),
         Contact(friction=0.4, moment=[[0.0] * 3, [0.0, np.nan, 0.0]]),
     ],
 )

@@ -1,6 +1,6 @@
 """Load capacity with any number of joints, any limits and any friction: all candidates are tried.
 
-`capacity` explains the problem; `three_joint_capacity` solves the common case quickly.
+`problem` explains the problem; `three_joint_capacity` solves the common case quickly.
 
 The limits are the planes a·(x, y, 1) <= b s as rows (a, b) of an array. Row 0 is s >= 0; joint i
 has the rows 2 i + 1 and 2 i + 2. The vectors a have length 1 and the largest |b| is 1.
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from leg_kinematics.kernels.kernel import scalar
-from leg_statics.capacity.three_joint import SAME, cross, dot, inner, tangents
+from leg_statics.capacity.three_joint import SAME, cross, dot, force_along, inner
 
 
 class CapacityStatus(IntEnum):
@@ -51,78 +51,71 @@ SOLVED = 1e-9  # residual of planes that should meet in a point, relative to the
 
 @scalar
 def plane_capacity(
-    jacobian: Any, lower: Any, upper: Any, bias: Any, friction: float, normal: Any
+    jacobian: Any, up: Any, down: Any, friction: float, axes: Any
 ) -> tuple[float, tuple[float, float, float], int, bool, int]:
     """Return the load capacity of one point.
 
     Args:
         jacobian: Jacobian (3, n).
-        lower: Smallest efforts (n,).
-        upper: Largest efforts (n,).
-        bias: Efforts without load (n,).
+        up: Room for efforts Jᵀ F > 0 (n,); negative where only a load brings a joint within limits.
+        down: Room for efforts Jᵀ F < 0 (n,).
         friction: Friction coefficient.
-        normal: Unit normal of the ground (3,).
+        axes: The vectors across, along, normal of F = (x, y, 1) / s, see `problem.load_axes`.
 
     Returns:
         The fields of `LoadCapacity`: capacity, force (a tuple of three), limiting joint, whether
         friction limits, status.
     """
     nothing = (math.nan, math.nan, math.nan)
-    if not _is_valid(jacobian, lower, upper, bias, friction, normal):
+    if not _is_valid(jacobian, up, down, friction, axes[2]):
         return math.nan, nothing, -1, False, INVALID_INPUT
-    across, along = tangents(normal)
-    planes, scale = _planes(jacobian, lower, upper, bias, across, along, normal)
+    planes, scale = _planes(jacobian, up, down, axes)
     s, x, y, joint, on_rim, status = _solve_planes(planes, friction)
     if status == INFEASIBLE:
         return math.nan, nothing, -1, False, INFEASIBLE
     capacity = scale / s
     if status == UNBOUNDED or capacity == math.inf:
         return math.inf, nothing, -1, False, UNBOUNDED
-    force = (
-        capacity * (x * across[0] + y * along[0] + normal[0]),
-        capacity * (x * across[1] + y * along[1] + normal[1]),
-        capacity * (x * across[2] + y * along[2] + normal[2]),
-    )
+    force = force_along(axes, capacity, x, y)
     if not (math.isfinite(force[0]) and math.isfinite(force[1]) and math.isfinite(force[2])):
         return math.inf, nothing, -1, False, UNBOUNDED  # beyond the range of floating point
     return capacity, force, int(joint), on_rim or friction == 0.0, BOUNDED
 
 
 @scalar
-def _is_valid(jacobian, lower, upper, bias, friction, normal):
-    """Return whether all numbers are finite but limits and friction, and those are in range."""
+def _is_valid(jacobian, up, down, friction, normal):
+    """Return whether all numbers are finite but room and friction, and those are in range.
+
+    The limits are in order if some effort is between them.
+    """
     valid = friction >= 0.0
     for i in range(3):
         valid &= math.isfinite(normal[i])
     for i in range(jacobian.shape[1]):
-        valid &= math.isfinite(bias[i]) and lower[i] < math.inf and upper[i] > -math.inf
-        valid &= lower[i] <= upper[i]
+        valid &= up[i] > -math.inf and down[i] > -math.inf and up[i] + down[i] >= 0.0
         for k in range(3):
             valid &= math.isfinite(jacobian[k, i])
     return valid
 
 
 @scalar
-def _column(jacobian, i, across, along, normal):
-    """Return column i of the Jacobian in the axes across, along, normal."""
+def _column(jacobian, i, axes):
+    """Return column i of the Jacobian along the axes."""
     column = jacobian[0, i], jacobian[1, i], jacobian[2, i]
-    return inner(column, across), inner(column, along), inner(column, normal)
+    return inner(column, axes[0]), inner(column, axes[1]), inner(column, axes[2])
 
 
 @scalar
-def _planes(jacobian, lower, upper, bias, across, along, normal):
+def _planes(jacobian, up, down, axes):
     """Return the planes, and the unit of 1/s; a limit that cannot bind repeats row 0."""
     n = jacobian.shape[1]
     planes = np.zeros((2 * n + 1, 4))
     planes[0, 3] = math.inf
     scale = 0.0
     for i in range(n):
-        column = _column(jacobian, i, across, along, normal)
+        column = _column(jacobian, i, axes)
         size = _length(column)
-        for row, sign, room in (
-            (2 * i + 1, 1.0, bias[i] - lower[i]),
-            (2 * i + 2, -1.0, upper[i] - bias[i]),
-        ):
+        for row, sign, room in ((2 * i + 1, 1.0, up[i]), (2 * i + 2, -1.0, down[i])):
             b = _room_per_length(room, size)
             planes[row, 3] = b
             if abs(b) < math.inf:

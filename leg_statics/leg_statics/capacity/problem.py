@@ -1,10 +1,15 @@
-"""Load capacity: the largest normal force the ground may exert on a foot within effort limits.
+"""Load capacity: the largest force the ground may exert on a foot within the limits of its leg.
 
-The ground's force F on the foot loads the actuators with the efforts e = Jᵀ F. Besides the efforts
-`bias` that the pose needs anyway, the limits leave `-down_i <= e_i <= up_i` with
-`up = bias - lower` and `down = upper - bias`. Friction keeps F in a circular cone about the normal
-of the ground. Load capacity is the largest normal component of F: a second-order cone programme in
-three variables.
+What loads a leg. Without load the actuators exert the efforts that the pose needs anyway: the bias,
+and what a moment of the ground takes. A moment of unknown direction, any that is horizontal, keeps
+a part of the limits in reserve. The force F of the ground adds -Jᵀ F (equations (5)-(7), (27) of
+paper 000), so the limits leave it the room `-down_i <= (Jᵀ F)_i <= up_i`:
+
+    effort = bias - J_omegaᵀ M        up = effort - (lower + reserve)
+                                      down = (upper - reserve) - effort
+
+Friction keeps F in a circular cone about the normal of the ground. Load capacity is the largest
+normal component of F: a second-order cone programme in three variables.
 
 It is solved exactly, by its geometry. Every force of the cone is F = (x, y, 1) / s in axes whose
 third is the normal, with (x, y) in the disc of radius mu and s = 1 / F_n. The limits become planes
@@ -13,6 +18,10 @@ where two planes meet above the disc's rim, or on a single plane at the rim. `th
 does so quickly where it can, `plane_capacity` in all other cases. That divides nowhere by the
 determinant of J, so singular poses need no exception: s = 0 means that the structure carries any
 load. Paper 000, eqs (15)-(21), is the same question for unit efforts without friction.
+
+Kernels pose and solve their problems in blocks (see `leg_kinematics.kernels.blocks`), whose rows
+stand below: they load what is given, call `bear_moments`, `leave_room` and `solve`, and read what
+is found. `load_capacity` is such a kernel for given Jacobians.
 """
 
 # The compiler infers the types of the scalar code below; only what Python calls is annotated.
@@ -41,7 +50,8 @@ from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_statics.capacity.planes import BOUNDED, INVALID_INPUT, plane_capacity
 from leg_statics.capacity.planes import CapacityStatus as CapacityStatus
-from leg_statics.capacity.three_joint import three_joint_capacity
+from leg_statics.capacity.three_joint import inner, tangents, three_joint_capacity
+from leg_statics.efforts import worst_moment_effort
 
 UP = np.array([0.0, 0.0, 1.0])
 UP.flags.writeable = False
@@ -74,11 +84,11 @@ def load_capacity(
     friction: ArrayLike,
     *,
     normal: ArrayLike = UP,
-    bias: ArrayLike = 0.0,
+    bias_efforts: ArrayLike = 0.0,
 ) -> LoadCapacity:
     """Return the largest normal force the ground may exert on the foot, and what limits it.
 
-    Maximises F·normal subject to `effort_lower <= bias - Jᵀ F <= effort_upper` and
+    Maximises F·normal subject to `effort_lower <= bias_efforts - Jᵀ F <= effort_upper` and
     `|F - (F·normal) normal| <= friction * (F·normal)`. All arguments broadcast over their leading
     axes.
 
@@ -88,7 +98,7 @@ def load_capacity(
         effort_upper: Largest actuator efforts (..., n) [N·m or N]; inf never limits.
         friction: Friction coefficient mu of the ground (...), 0 to inf.
         normal: Normal of the ground, out of the ground, of any length (..., 3).
-        bias: Efforts the pose needs without load (..., n) or one for all [N·m or N].
+        bias_efforts: Efforts the pose needs without load (..., n) or one for all [N·m or N].
 
     Raises:
         ShapeError: If a shape is wrong or shapes do not broadcast.
@@ -102,12 +112,17 @@ def load_capacity(
     lower = as_array("effort_lower", effort_lower, n)
     upper = as_array("effort_upper", effort_upper, n)
     mu, direction = as_array("friction", friction), as_array("normal", normal, 3)
-    idle = as_vectors("bias", bias, n)
+    idle = as_vectors("bias_efforts", bias_efforts, n)
     try:
         result = LoadCapacity(*_load_capacity(matrix, lower, upper, idle, mu, direction))
     except ValueError:
         shapes = {"jacobian": matrix.shape[:-2], "friction": mu.shape}
-        others = {"effort_lower": lower, "effort_upper": upper, "bias": idle, "normal": direction}
+        others = {
+            "effort_lower": lower,
+            "effort_upper": upper,
+            "bias_efforts": idle,
+            "normal": direction,
+        }
         shapes |= {name: array.shape[:-1] for name, array in others.items()}
         raise broadcast_error(shapes) from None
     if not result.status.size or has_code(result.status, INVALID_INPUT):
@@ -143,11 +158,148 @@ def check_normals(name: str, vectors: FloatArray) -> None:
         raise ValueRangeError(f"{name} must be finite and not zero, got {vectors[bad][0].tolist()}")
 
 
-# --------------------------------------------------------------------------- kernel
+# --------------------------------------------------------------------------- the problem
 
-# Rows of a block: the Jacobian by columns, limits, bias, friction and normal, then the results
-J, LOWER, UPPER, BIAS, MU, NORMAL = 0, 9, 12, 15, 18, 19
-CAPACITY, FORCE, JOINT, ON_CONE, CERTAIN, ROWS = 22, 23, 26, 27, 28, 29
+# Rows of a block. What a contact gives, in its order (see `Contact`): friction, normal, the load
+# and the moments that must be borne;
+MU, NORMAL, LOAD, MOMENT, ANY_MOMENT, OF_CONTACT = 0, 1, 4, 5, 8, 9
+# what is found besides capacity and force: whether a solution is wanted and whether the quick one
+# is certain, capacity without friction limit, limiting joint, force on the cone, status;
+WANTED, CERTAIN, ROUGH, JOINT, ON_CONE, OUTCOME = 9, 10, 11, 12, 13, 14
+# eight rows are the caller's;
+OF_CALLER = 15
+CAPACITY, FORCE, OF_POINT = 23, 24, 27
+# then what n joints have, each row n times: efforts without load, limits, bias, reserve, room;
+# columns of both Jacobians (3 n).
+EFFORT, LOWER, UPPER, BIAS, RESERVE, ROOM_UP, ROOM_DOWN = range(7)
+J, OMEGA, OF_JOINT = 7, 10, 13
+
+
+@inlined
+def row_of(joint_row, n, joint):
+    """Return the row of a number of a joint."""
+    width = 3 if joint_row >= J else 1
+    return OF_POINT + joint_row * n + width * joint
+
+
+@inlined
+def new_block(n, points):
+    """Return a block for problems with n joints, of which so many are to be solved: no load yet."""
+    block = np.empty((OF_POINT + OF_JOINT * n, BLOCK))
+    for i in range(min(BLOCK, points)):
+        block[LOAD, i], block[WANTED, i], block[CERTAIN, i] = 0.0, 1.0, 0.0
+    return block
+
+
+@inlined
+def bear_moments(block, i, n):
+    """Find what the actuators bear before any load: the moments and, as a bias, the leg itself."""
+    moment = get3(block, MOMENT, i)
+    for k in range(n):
+        omega = get3(block, row_of(OMEGA, n, k), i)
+        reserve = worst_moment_effort(omega[0], omega[1]) * block[ANY_MOMENT, i]
+        block[row_of(RESERVE, n, k), i] = reserve
+        block[row_of(EFFORT, n, k), i] = block[row_of(BIAS, n, k), i] - inner(omega, moment)
+
+
+def effort_room(lower: Any, upper: Any, effort: Any, reserve: Any) -> tuple[Any, Any]:
+    """Return how far the part Jᵀ F of a joint may go up and down.
+
+    Args:
+        lower: Smallest effort, or those of joints.
+        upper: Largest effort.
+        effort: Effort without load.
+        reserve: By how much it may vary.
+    """
+    return effort - (lower + reserve), (upper - reserve) - effort
+
+
+_room = inlined(effort_room)
+
+
+@inlined
+def leave_room(block, i, n):
+    """Find what the limits leave to the load, and return whether the leg is held without one."""
+    holds = True
+    for k in range(n):
+        up, down = _room(
+            block[row_of(LOWER, n, k), i],
+            block[row_of(UPPER, n, k), i],
+            block[row_of(EFFORT, n, k), i],
+            block[row_of(RESERVE, n, k), i],
+        )
+        holds &= (up >= 0.0) & (down >= 0.0)
+        block[row_of(ROOM_UP, n, k), i] = up
+        block[row_of(ROOM_DOWN, n, k), i] = down
+    return holds
+
+
+@inlined
+def solve(block, jacobian, start, end, n):
+    """Solve problems start to end, quickly where that is certain, by all planes elsewhere."""
+    if n == 3:
+        for i in range(end - start):
+            _solve_three(block, i)
+    for i in range(end - start):
+        if block[WANTED, i] == 1.0 and block[CERTAIN, i] == 0.0:
+            _solve_any(block, i, n, jacobian[start + i])
+
+
+@inlined
+def _solve_three(block, i):
+    """Solve a problem with three joints if that is quick."""
+    columns = (
+        get3(block, row_of(J, 3, 0), i),
+        get3(block, row_of(J, 3, 1), i),
+        get3(block, row_of(J, 3, 2), i),
+    )
+    up, down = get3(block, row_of(ROOM_UP, 3, 0), i), get3(block, row_of(ROOM_DOWN, 3, 0), i)
+    axes = load_axes(get3(block, NORMAL, i))
+    found = three_joint_capacity(columns, up, down, block[MU, i], axes)
+    block[CAPACITY, i] = found.capacity
+    put(block, FORCE, i, found.force)
+    block[ROUGH, i] = found.rough
+    block[JOINT, i] = found.limiting_joint
+    block[ON_CONE, i] = 1.0 if found.friction_limited else 0.0
+    block[CERTAIN, i] = 1.0 if found.certain else 0.0
+    block[OUTCOME, i] = BOUNDED
+
+
+@scalar
+def _solve_any(block, i, n, jacobian):
+    """Solve a problem with any number of joints; of any roughness only if the load is too heavy."""
+    capacity, force, joint, on_cone, outcome = _all_planes(block, i, n, jacobian, block[MU, i])
+    block[CAPACITY, i] = block[ROUGH, i] = capacity
+    if capacity < block[LOAD, i]:
+        block[ROUGH, i] = _all_planes(block, i, n, jacobian, math.inf)[0]
+    put(block, FORCE, i, force)
+    block[JOINT, i] = joint
+    block[ON_CONE, i] = 1.0 if on_cone else 0.0
+    block[OUTCOME, i] = outcome
+
+
+@scalar
+def _all_planes(block, i, n, jacobian, friction):
+    up, down = row_of(ROOM_UP, n, 0), row_of(ROOM_DOWN, n, 0)
+    axes = load_axes(get3(block, NORMAL, i))
+    return plane_capacity(
+        jacobian, block[up : up + n, i], block[down : down + n, i], friction, axes
+    )
+
+
+@inlined
+def load_axes(normal):
+    """Return the axes in which a force of the cone is (x, y, 1) / s, where 1 / s is the load.
+
+    The direction in which a load counts enters here and nowhere else. It is the normal of the
+    ground, along which the cone's section is a circle.
+
+    Args:
+        normal: Normal of the ground, of any length.
+    """
+    direction = unit(normal)
+    across, along = tangents(direction)
+    return across, along, direction
 
 
 @inlined
@@ -159,38 +311,7 @@ def unit(vector):
     return x * per_length, y * per_length, z * per_length
 
 
-@inlined
-def difference(a, b):
-    """Return a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@scalar
-def capacity_of_point(
-    jacobian: Any, lower: Any, upper: Any, bias: Any, friction: float, normal: Any
-) -> float:
-    """Return the load capacity of one point [N], for use inside other kernels.
-
-    Args:
-        jacobian: Jacobian (3, n).
-        lower: Smallest efforts (n,).
-        upper: Largest efforts (n,).
-        bias: Efforts without load (n,).
-        friction: Friction coefficient.
-        normal: Unit normal of the ground (3,).
-    """
-    n = (normal[0], normal[1], normal[2])
-    if jacobian.shape[1] == 3:
-        columns = (
-            (jacobian[0, 0], jacobian[1, 0], jacobian[2, 0]),
-            (jacobian[0, 1], jacobian[1, 1], jacobian[2, 1]),
-            (jacobian[0, 2], jacobian[1, 2], jacobian[2, 2]),
-        )
-        up, down = difference(bias, lower), difference(upper, bias)
-        quick = three_joint_capacity(columns, up, down, friction, n)
-        if quick.certain:
-            return quick.capacity
-    return plane_capacity(jacobian, lower, upper, bias, friction, n)[0]
+# --------------------------------------------------------------------------- given Jacobians
 
 
 @points_kernel(
@@ -210,44 +331,36 @@ def _load_capacity(
     friction_limited: Any,
     status: Any,
 ) -> None:
-    """Take the quick way where its answer is certain, and try all planes elsewhere."""
-    three_joints = jacobian.shape[2] == 3
-    block = np.empty((ROWS, BLOCK))
+    """Solve points in blocks; with three joints the number is a constant for the compiler."""
+    n = jacobian.shape[2]
+    block = new_block(n, len(jacobian))
     for i in range(min(BLOCK, len(jacobian))):
-        block[CERTAIN, i] = 0.0
+        for k in range(n):
+            block[row_of(RESERVE, n, k), i] = 0.0
     for start in range(0, len(jacobian), BLOCK):
         end = min(start + BLOCK, len(jacobian))
-        if three_joints:
-            load_columns(block, J, jacobian, start, end, 3)
-            load(block, LOWER, lower, start, end, 3)
-            load(block, UPPER, upper, start, end, 3)
-            load(block, BIAS, bias, start, end, 3)
-            load_numbers(block, MU, friction, start, end)
-            load(block, NORMAL, normal, start, end, 3)
-            for i in range(end - start):
-                columns = get3(block, J, i), get3(block, J + 3, i), get3(block, J + 6, i)
-                idle = get3(block, BIAS, i)
-                up = difference(idle, get3(block, LOWER, i))
-                down = difference(get3(block, UPPER, i), idle)
-                n = unit(get3(block, NORMAL, i))
-                quick = three_joint_capacity(columns, up, down, block[MU, i], n)
-                block[CAPACITY, i] = quick.capacity
-                put(block, FORCE, i, quick.force)
-                block[JOINT, i] = quick.limiting_joint
-                block[ON_CONE, i] = 1.0 if quick.friction_limited else 0.0
-                block[CERTAIN, i] = 1.0 if quick.certain else 0.0
+        load_numbers(block, MU, friction, start, end)
+        load(block, NORMAL, normal, start, end, 3)
+        if n == 3:
+            _solve_block(block, jacobian, lower, upper, bias, start, end, 3)
+        else:
+            _solve_block(block, jacobian, lower, upper, bias, start, end, n)
         for i in range(end - start):
             k = start + i
-            if block[CERTAIN, i] == 1.0:
-                capacity[k], limiting_joint[k] = block[CAPACITY, i], int(block[JOINT, i])
-                force[k, 0], force[k, 1], force[k, 2] = get3(block, FORCE, i)
-                friction_limited[k], status[k] = block[ON_CONE, i] == 1.0, BOUNDED
-            else:
-                n = unit((normal[k, 0], normal[k, 1], normal[k, 2]))
-                (
-                    capacity[k],
-                    (force[k, 0], force[k, 1], force[k, 2]),
-                    limiting_joint[k],
-                    friction_limited[k],
-                    status[k],
-                ) = plane_capacity(jacobian[k], lower[k], upper[k], bias[k], friction[k], n)
+            capacity[k] = block[CAPACITY, i]
+            force[k, 0], force[k, 1], force[k, 2] = get3(block, FORCE, i)
+            limiting_joint[k] = int(block[JOINT, i])
+            friction_limited[k] = block[ON_CONE, i] == 1.0
+            status[k] = int(block[OUTCOME, i])
+
+
+@inlined
+def _solve_block(block, jacobian, lower, upper, bias, start, end, n):
+    """Solve points start to end, whose friction and normals are in the block."""
+    load(block, row_of(LOWER, n, 0), lower, start, end, n)
+    load(block, row_of(UPPER, n, 0), upper, start, end, n)
+    load(block, row_of(EFFORT, n, 0), bias, start, end, n)
+    load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
+    for i in range(end - start):
+        leave_room(block, i, n)
+    solve(block, jacobian, start, end, n)

@@ -1,6 +1,6 @@
 """Load capacity of a leg with three actuators whose limits admit the unloaded pose, quickly.
 
-That is the common case; `capacity` explains the problem and handles all others. There is no branch
+That is the common case; `problem` explains the problem and handles all others. There is no branch
 in this module, so that loops over points are compiled to instructions for several points at once:
 every candidate for the optimum is computed, then the right one is picked.
 
@@ -45,31 +45,36 @@ class ThreeJointCapacity(NamedTuple):
 
 
 @inlined
-def three_joint_capacity(columns, up, down, mu, normal):
+def three_joint_capacity(columns, up, down, mu, axes):
     """Return the load capacity of a leg with three actuators.
 
     Args:
         columns: The columns of the Jacobian, 3 tuples (3,).
-        up: Room for efforts Jᵀ F > 0, i.e. bias - lower (3,).
-        down: Room for efforts Jᵀ F < 0, i.e. upper - bias (3,).
+        up: Room for efforts Jᵀ F > 0 (3,).
+        down: Room for efforts Jᵀ F < 0 (3,).
         mu: Friction coefficient.
-        normal: Unit normal of the ground (3,).
+        axes: The vectors across, along, normal of F = (x, y, 1) / s, see `problem.load_axes`.
     """
-    across, along = tangents(normal)
-    axes = across, along, normal
     p = _joint(columns[0], up[0], down[0], axes, 0.0)
     q = _joint(columns[1], up[1], down[1], axes, 1.0)
     r = _joint(columns[2], up[2], down[2], axes, 2.0)
     s, x, y, index, on_rim, rough, certain = _solve(p, q, r, mu)
     capacity = 1.0 / s
-    force = (
-        capacity * (x * across[0] + y * along[0] + normal[0]),
-        capacity * (x * across[1] + y * along[1] + normal[1]),
-        capacity * (x * across[2] + y * along[2] + normal[2]),
-    )
+    force = force_along(axes, capacity, x, y)
     certain &= _is_ordinary(p) & _is_ordinary(q) & _is_ordinary(r) & (mu >= 0.0)
     certain &= math.isfinite(force[0] + force[1] + force[2])
     return ThreeJointCapacity(capacity, force, index, on_rim | (mu == 0.0), 1.0 / rough, certain)
+
+
+@inlined
+def force_along(axes, size, x, y):
+    """Return the force size (x, y, 1) in the axes across, along, normal."""
+    across, along, normal = axes
+    return (
+        size * (x * across[0] + y * along[0] + normal[0]),
+        size * (x * across[1] + y * along[1] + normal[1]),
+        size * (x * across[2] + y * along[2] + normal[2]),
+    )
 
 
 @inlined

@@ -66,7 +66,9 @@ def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
         *read_ground(grounds, request.ground, frame)[:2],
         load=_magnitude("required_load", request.required_load, "N"),
         moment=_numbers(moment),
-        any_moment=_magnitude("any_direction_moment", request.any_direction_moment, "N.m"),
+        any_direction_moment=_magnitude(
+            "any_direction_moment", request.any_direction_moment, "N.m"
+        ),
     )
 
 

@@ -33,27 +33,26 @@ def fill_footholds(
     leg = standing_leg(robot, request.leg)
     frame = find_frame(robot, leg, request.header.frame_id)
     contact = read_contact(grounds, request, frame)
-    contact = contact._replace(bias=read_bias(leg, request.bias_efforts))
+    contact = contact._replace(bias_efforts=read_bias(leg, request.bias_efforts))
     positions = read_rows("positions", request.positions, XYZ)
     check_count("positions", len(positions), max_points)
     found = evaluate_footholds(
         leg.mechanism, leg.effort_limits, frame.points_to_leg(positions), contact
     )
-    ranking = found.ranking()
     response.verdict = to_field(found.verdict, np.uint8)
-    response.status = to_field(found.posture.status, np.uint8)
+    response.status = to_field(found.status, np.uint8)
     response.load_capacity = to_field(found.load_capacity)
     response.rated_friction = to_field(found.rated_friction)
     response.rated_friction_full = to_field(found.rated_friction_full)
     response.friction_margin = to_field(found.friction_margin)
     response.utilisation = to_field(found.utilisation)
     response.limiting_joint = to_field(found.limiting_joint, np.int32)
-    response.ranking = to_field(ranking, np.int32)
-    response.best = int(ranking[0]) if len(ranking) else -1
+    response.ranking = to_field(found.ranking, np.int32)
+    response.best = found.best
     response.friction_coefficient = float(np.asarray(contact.friction))
     if request.include_efforts:
         response.joint_names = list(leg.joint_names)
-        response.joint_efforts = to_field(found.efforts)
+        response.joint_efforts = to_field(found.joint_efforts)
         response.forces = to_field(frame.vectors_from_leg(found.force))
 
 
