@@ -19,7 +19,6 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
-            "plot_gantry_example = leg_statics.published.plot_gantry_example:main",
             "designs_node = leg_statics.nodes.entry_points:designs_node",
             "judge_bag = leg_statics.recordings.judge_bag:main",
             "maps_node = leg_statics.nodes.entry_points:maps_node",

@@ -10,56 +10,18 @@ import contextlib
 import importlib
 import io
 import pkgutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
-import leg_statics.published
-from leg_statics.commands import plot_index_map, synthesize_six_bar
-from leg_statics.drawing.designs import plot_designs
-from leg_statics.drawing.style import write_figure
-from leg_statics.published import paper_000, plot_gantry_example
+import leg_statics.published.figures
 from leg_statics.published.comparison import Comparison
 
 COLUMNS = ("item", "paper", "ours", "difference", "verdict", "note")
-
-
-def draw_paper_000(folder: Path) -> None:
-    """Draw what figures 2 and 5 to 8 show, of the leg before and after the optimisation."""
-    plot_index_map.main(["--type", "initial", "--all", str(folder)])
-    plot_index_map.main(["--type", "optimised", "--all", str(folder)])
-    plot_index_map.main(["--figure", "8", "--output", str(folder / "hexapod_both_8.png")])
-    found = paper_000.paper_search()
-    marked = {
-        "initial": found.before,
-        "paper's optimum": found.means[found.find(tuple(paper_000.OPTIMISED_LENGTHS.values()))],
-        "best by (33)": found.means[np.argmax(found.objective)],
-    }
-    figure = plot_designs(found.means[found.known], marked, before=found.before)
-    write_figure(figure, folder / "hexapod_initial_7.png")
-
-
-def draw_paper_001(folder: Path) -> None:
-    """Draw the maps of the quadruped's leg; figures 3 and 4 are those of K_F and K_J."""
-    plot_index_map.main(["--robot", "quadruped", "--all", str(folder)])
-    for name in ("planar_force", "planar_imbalance"):
-        path = folder / f"{name}.png"
-        plot_index_map.main(["--robot", "quadruped", "--index", name, "--output", str(path)])
-
-
-# What draws the figures of a paper into a folder.
-FIGURES: dict[str, Callable[[Path], object]] = {
-    "paper_000": draw_paper_000,
-    "paper_001": draw_paper_001,
-    "paper_003": lambda folder: synthesize_six_bar.main(["--figures", str(folder)]),
-    "paper_004": plot_gantry_example.write_figures,
-}
 
 
 class Paper(NamedTuple):
@@ -80,10 +42,11 @@ class Paper(NamedTuple):
 def evaluate(name: str, output: Path) -> Paper:
     """Compute the comparisons of a paper and draw its figures."""
     module = importlib.import_module(f"leg_statics.published.{name}")
+    figures = importlib.import_module(f"leg_statics.published.figures.{name}")
     folder = output / name
     folder.mkdir(parents=True, exist_ok=True)
     with contextlib.redirect_stdout(io.StringIO()):  # the commands print what they wrote
-        FIGURES[name](folder)
+        figures.draw(folder)
     title = str(module.__doc__).splitlines()[0]
     return Paper(name, title, module.comparisons(), sorted(folder.glob("*.png")))
 
@@ -124,10 +87,10 @@ def main() -> None:
     console = Console()
     if not console.is_terminal:  # a pipe or a file has no width: take one that fits the tables
         console = Console(width=160)
-    modules = [m.name for m in pkgutil.iter_modules(leg_statics.published.__path__)]
+    names = [module.name for module in pkgutil.iter_modules(leg_statics.published.figures.__path__)]
     papers = []
     with Progress(console=console, transient=True) as progress:
-        for name in progress.track([m for m in modules if m in FIGURES], description="computing"):
+        for name in progress.track(names, description="computing"):
             papers.append(evaluate(name, output))
     for paper in papers:
         print_paper(console, paper)

@@ -14,6 +14,7 @@ from leg_kinematics.mechanisms.six_bar import SixBar
 from leg_statics.commands import synthesize_six_bar
 from leg_statics.design.synthesis import (
     JANSEN,
+    PAPER_PHI_MAX,
     Design,
     angle_deviations,
     fit,
@@ -26,7 +27,7 @@ from leg_statics.design.synthesis import (
 )
 from leg_statics.published import paper_003
 
-OPTIMUM = synthesize(paper_003.BEST_PHI_MAX)
+OPTIMUM = synthesize(PAPER_PHI_MAX)
 
 
 @pytest.fixture(scope="module")

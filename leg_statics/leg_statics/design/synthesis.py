@@ -31,6 +31,7 @@ from leg_kinematics.mechanisms.six_bar import (
 from leg_kinematics.mechanisms.theo_jansen import TheoJansen
 
 SAMPLES = 200  # N of equation (8)
+PAPER_PHI_MAX = math.radians(168.0)  # the paper's choice, section 4
 SHORTEST, LONGEST, LENGTH_STEPS = 0.02, 14.0, 1400  # where roots of (17) are looked for, in cranks
 
 ComplexArray = NDArray[np.complex128]
@@ -174,6 +175,12 @@ def jansen_phi(crank_angles: ArrayLike) -> FloatArray:
     """Return phi', the angle from CF' to CB in Jansen's linkage (figure 5) [rad]."""
     p = jansen_points(crank_angles)
     return np.angle((p["B"] - p["C"]) / (p["F"] - p["C"])) % (2.0 * np.pi)
+
+
+def jansen_foot_link(crank_angles: ArrayLike) -> FloatArray:
+    """Return phi_5', the angle from the rocker CD to the foot bar CG in Jansen's linkage [rad]."""
+    p = jansen_points(crank_angles)
+    return np.angle((p["G"] - p["C"]) / (p["D"] - p["C"])) % (2.0 * np.pi)
 
 
 def limit_positions() -> LimitPositions:

@@ -13,6 +13,7 @@ import numpy as np
 from leg_kinematics.gait_curve import GaitCurve, gait_curve
 from leg_statics.design.synthesis import (
     JANSEN,
+    PAPER_PHI_MAX,
     Design,
     fit,
     limit_positions,
@@ -29,9 +30,8 @@ PHI_LARGEST, PHI_LARGEST_AT = math.radians(181.68), math.radians(348.55)
 PHI_SMALLEST, PHI_SMALLEST_AT = math.radians(103.96), math.radians(167.94)
 SWING = math.radians(77.72)  # (15)
 
-# Range and best value of phi_max in figure 7 [rad], and the number of crank angles in (8).
+# Range of phi_max in figure 7 [rad], and the number of crank angles in (8).
 PHI_MAX_RANGE = (math.radians(78.0), math.radians(180.0))
-BEST_PHI_MAX = math.radians(168.0)
 SAMPLES = 200
 
 LARGEST_DEVIATION = 0.26  # of the foot from Jansen's: "smaller than" [cranks]
@@ -58,7 +58,7 @@ def legs(seed: int = 0) -> Legs:
     Args:
         seed: Seed of the direct search.
     """
-    optimum, direct = synthesize(BEST_PHI_MAX), search(seed)
+    optimum, direct = synthesize(PAPER_PHI_MAX), search(seed)
     return Legs(
         optimum,
         direct,
@@ -101,7 +101,7 @@ def claim_comparisons() -> list[Comparison]:
     curve = sweep(np.radians(0.5 * np.arange(low, high + 1)), SAMPLES)
     best = [math.degrees(curve.phi_max[np.nanargmin(values)]) for values in curve.fits]
     best_rms, best_mean, best_foot = best
-    optimum = synthesize(BEST_PHI_MAX)
+    optimum = synthesize(PAPER_PHI_MAX)
     deviation = float(fit(optimum).largest_deviation)
     curves = gait_curve(JANSEN), gait_curve(optimum.mechanism())
     heights = [c.step_height for c in curves]
@@ -109,7 +109,7 @@ def claim_comparisons() -> list[Comparison]:
     claims = (
         (
             "eta is least at phi_max = 168°",
-            min(abs(angle - math.degrees(BEST_PHI_MAX)) for angle in best) <= 1.0,
+            min(abs(angle - math.degrees(PAPER_PHI_MAX)) for angle in best) <= 1.0,
             f"{best_rms:.1f}° by rms, {best_mean:.1f}° by mean, {best_foot:.1f}° by largest foot "
             "deviation",
             "the norm of (8) is not printed",

@@ -1,8 +1,7 @@
-"""Draw figures 4 and 5 of paper 004: the drives and the output shaft in its example of 5 s."""
+"""Figures 4 and 5 of paper 004: the drives and the output shaft in its example of 5 s."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from leg_kinematics.arrays import FloatArray
+from leg_statics.drawing.style import write_figure
 from leg_statics.published.paper_004 import (
     DURATION,
     drive_motion,
@@ -38,7 +38,6 @@ AXES = {
     "about Y": (VERMILION, DASHED),
     "about Z": (BLUE, SOLID),
 }
-FORMATS = ("png", "svg")
 
 
 def displacement_figure() -> Figure:
@@ -99,28 +98,7 @@ def _draw(
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def write_figures(folder: Path) -> list[Path]:
-    """Write both figures as PNG and SVG and return their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    figures = {
-        "gantry_displacements": displacement_figure(),
-        "gantry_output_shaft": output_figure(),
-    }
-    for name, figure in figures.items():
-        for suffix in FORMATS:
-            written.append(folder / f"{name}.{suffix}")
-            figure.savefig(written[-1], dpi=160)
-    return written
-
-
-def main() -> None:
-    """Write the figures to a folder."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path(), help="folder of the pictures")
-    for path in write_figures(parser.parse_args().output):
-        print(path)
-
-
-if __name__ == "__main__":
-    main()
+def draw(folder: Path) -> None:
+    """Draw the figures into a folder."""
+    write_figure(displacement_figure(), folder / "gantry_displacements.png")
+    write_figure(output_figure(), folder / "gantry_output_shaft.png")

@@ -1,0 +1,1 @@
+"""The figures of the papers, drawn from what this suite computes: one module a paper."""
