@@ -14,6 +14,7 @@ from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_numbers, put, store
 from leg_kinematics.kernels.kernel import inlined
 from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.vectors import inner, unit
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 from leg_statics.capacity.problem import (
@@ -42,9 +43,7 @@ from leg_statics.capacity.problem import (
     new_block,
     row_of,
     solve,
-    unit,
 )
-from leg_statics.capacity.three_joint import inner
 from leg_statics.contact import Contact as Contact
 from leg_statics.contact import check_contact, contact_rows, leading_shapes
 from leg_statics.efforts import share_of_limits

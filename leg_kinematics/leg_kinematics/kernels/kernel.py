@@ -33,18 +33,20 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core.dispatcher import Dispatcher
+from numba.extending import register_jitable
 
-# numpy's error model: a division by zero yields inf or NaN for that point, never an exception.
-scalar = numba.njit(error_model="numpy")
+# To Python such functions are what they were; kernels compile them without what a call from Python
+# would need, which takes as long again. numpy's error model: in a kernel a division by zero yields
+# inf or NaN for that point, never an exception.
+scalar = register_jitable(error_model="numpy")
 # The same for short code without branches: loops of kernels take it in and compute several points
 # with one instruction.
-inlined = numba.njit(error_model="numpy", forceinline=True)
+inlined = register_jitable(error_model="numpy", forceinline=True)
 
 _thread_lock = threading.RLock()
 
@@ -176,8 +178,8 @@ def _meanings(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
         yield repr((code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants))
         for name in code.co_names:
             value = function.__globals__.get(name)
-            if isinstance(value, Dispatcher):
-                yield from _meanings(value.py_func, seen)
+            if isinstance(value, FunctionType):
+                yield from _meanings(value, seen)
             elif isinstance(value, (int, float)) and value == value:  # no NaN
                 yield f"{name}={value!r}"
             elif isinstance(value, type):

@@ -139,7 +139,10 @@ class PointsKernel:
         function.__qualname__ = f"{self.function.__qualname__}.{name}"
 
         def compiled(cache: bool) -> Any:
-            return numba.njit(tuple(signature), cache=cache, **options)(function)
+            decorate = numba.njit(
+                tuple(signature), cache=cache, error_model="numpy", no_cfunc_wrapper=True, **options
+            )
+            return decorate(function)
 
         return compile_or_load(self.function, compiled, name, self._source)
 
@@ -149,7 +152,7 @@ class PointsKernel:
         names = {
             "__name__": self.function.__module__,
             "kernel": self,
-            "function": numba.njit(error_model="numpy")(self.function),
+            "function": numba.njit(error_model="numpy", inline="always")(self.function),
             "np": np,
             "empty": np.empty,
             "ndarray": np.ndarray,

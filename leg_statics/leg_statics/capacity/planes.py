@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from leg_kinematics.kernels.kernel import scalar
-from leg_statics.capacity.three_joint import SAME, cross, dot, force_along, inner
+from leg_kinematics.kernels.vectors import cross, inner, length
+from leg_statics.capacity.three_joint import SAME, dot, force_along
 
 
 class CapacityStatus(IntEnum):
@@ -114,7 +115,7 @@ def _planes(jacobian, up, down, axes):
     scale = 0.0
     for i in range(n):
         column = _column(jacobian, i, axes)
-        size = _length(column)
+        size = length(column)
         for row, sign, room in ((2 * i + 1, 1.0, up[i]), (2 * i + 2, -1.0, down[i])):
             b = _room_per_length(room, size)
             planes[row, 3] = b
@@ -127,12 +128,6 @@ def _planes(jacobian, up, down, axes):
     for row in range(2 * n + 1):
         planes[row, 3] = 1.0 if planes[row, 3] == math.inf else planes[row, 3] / scale
     return planes, scale
-
-
-@scalar
-def _length(a):
-    """Return the length of a vector without overflow."""
-    return math.hypot(math.hypot(a[0], a[1]), a[2])
 
 
 @scalar
@@ -275,7 +270,7 @@ def _vertex(planes, i, j, k, mu):
     """
     a, third = planes[i], planes[k]
     rest, along = _without(planes[j], a)
-    size = _length(rest)
+    size = length(rest)
     b, _ = _without((rest[0] / size, rest[1] / size, rest[2] / size), a)  # again, for rounding
     c = cross(a, b)
     if k == 0:

@@ -48,9 +48,10 @@ from leg_kinematics.errors import ShapeError, ValueRangeError
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_numbers, put
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.vectors import inner, tangents, unit
 from leg_statics.capacity.planes import BOUNDED, INVALID_INPUT, plane_capacity
 from leg_statics.capacity.planes import CapacityStatus as CapacityStatus
-from leg_statics.capacity.three_joint import inner, tangents, three_joint_capacity
+from leg_statics.capacity.three_joint import three_joint_capacity
 from leg_statics.efforts import worst_moment_effort
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -202,6 +203,7 @@ def bear_moments(block, i, n):
         block[row_of(EFFORT, n, k), i] = block[row_of(BIAS, n, k), i] - inner(omega, moment)
 
 
+@inlined
 def effort_room(lower: Any, upper: Any, effort: Any, reserve: Any) -> tuple[Any, Any]:
     """Return how far the part Jᵀ F of a joint may go up and down.
 
@@ -214,15 +216,12 @@ def effort_room(lower: Any, upper: Any, effort: Any, reserve: Any) -> tuple[Any,
     return effort - (lower + reserve), (upper - reserve) - effort
 
 
-_room = inlined(effort_room)
-
-
 @inlined
 def leave_room(block, i, n):
     """Find what the limits leave to the load, and return whether the leg is held without one."""
     holds = True
     for k in range(n):
-        up, down = _room(
+        up, down = effort_room(
             block[row_of(LOWER, n, k), i],
             block[row_of(UPPER, n, k), i],
             block[row_of(EFFORT, n, k), i],
@@ -300,15 +299,6 @@ def load_axes(normal):
     direction = unit(normal)
     across, along = tangents(direction)
     return across, along, direction
-
-
-@inlined
-def unit(vector):
-    """Return a vector of length 1 along another; NaN if that has no direction."""
-    largest = max(abs(vector[0]), abs(vector[1]), abs(vector[2]))
-    x, y, z = vector[0] / largest, vector[1] / largest, vector[2] / largest
-    per_length = 1.0 / math.sqrt(x * x + y * y + z * z)
-    return x * per_length, y * per_length, z * per_length
 
 
 # --------------------------------------------------------------------------- given Jacobians

@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from leg_kinematics.kernels.kernel import inlined
+from leg_kinematics.kernels.vectors import cross, inner
 
 SAME = 1e-11  # two values of s differ by rounding only
 ILL_CONDITIONED = 1e-8  # s relative to that of a unit force, below which rounding needs care
@@ -75,31 +76,6 @@ def force_along(axes, size, x, y):
         size * (x * across[1] + y * along[1] + normal[1]),
         size * (x * across[2] + y * along[2] + normal[2]),
     )
-
-
-@inlined
-def tangents(normal):
-    """Return two unit vectors that complete `normal` to right-handed axes (Duff et al. 2017).
-
-    For the normal (0, 0, 1) they are (1, 0, 0) and (0, 1, 0).
-    """
-    nx, ny, nz = normal[0], normal[1], normal[2]
-    sign = math.copysign(1.0, nz)
-    a = -1.0 / (sign + nz)
-    b = nx * ny * a
-    return (1.0 + sign * nx * nx * a, sign * b, -sign * nx), (b, sign + ny * ny * a, -ny)
-
-
-@inlined
-def cross(a, b):
-    """Return a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
-def inner(a, b):
-    """Return a·b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
