@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -16,8 +15,9 @@ import pytest
 from geometry_msgs.msg import PoseArray
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses
-from nodes_support import START_TIMEOUT
+from nodes_support import PATIENCE, START_TIMEOUT, wait_for
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_domain import claim_domain
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
 
@@ -40,7 +40,7 @@ def start(name, *arguments, **environment):
     )
 
 
-def run(name, *arguments, timeout=60.0, **environment):
+def run(name, *arguments, timeout=START_TIMEOUT, **environment):
     process = start(name, *arguments, **environment)
     try:
         output, errors = process.communicate(timeout=timeout)
@@ -73,7 +73,9 @@ def walk(nodes, tmp_path_factory):
     ros = ["--ros-args", "-p", "robot:=examples", "-p", f"distance:={DISTANCE}"]
     program = run("04_walk_over_terrain.py", "--output", folder, "--json", plan, *ros)
     assert program.code == 0, program.output + program.errors
-    time.sleep(0.2)
+    steps = len(json.loads(plan.read_text())["half_steps"])
+    wait_for(lambda: all(len(published[topic]) >= steps for topic in ("footholds", "step_length")))
+    wait_for(lambda: published["plan"])
     for subscription in subscriptions:
         nodes.node.destroy_subscription(subscription)
     return SimpleNamespace(
@@ -110,7 +112,7 @@ def test_the_short_examples_run(nodes, tmp_path, name, words):
 
 
 def test_without_nodes_an_example_says_how_to_start_them():
-    answer = run("01_ask_one_foothold.py", ROS_DOMAIN_ID="100")
+    answer = run("01_ask_one_foothold.py", ROS_DOMAIN_ID=claim_domain())
     assert answer.code == 1
     assert "make run" in answer.errors
     assert "Traceback" not in answer.errors
@@ -207,12 +209,12 @@ def test_the_walk_stops_with_a_reason_where_it_cannot_go_on(nodes, tmp_path):
 
 
 def test_ctrl_c_ends_the_walk_cleanly(nodes, tmp_path):
-    ros = ["--ros-args", "-p", "robot:=examples", "-p", "pause:=0.2"]
+    ros = ["--ros-args", "-p", "robot:=examples", "-p", "pause:=0.2", "-p", "distance:=1000.0"]
     walker = start("04_walk_over_terrain.py", "--output", tmp_path, *ros, PYTHONUNBUFFERED="1")
     try:
         assert walker.stdout.readline().strip().startswith("1 ")
         walker.send_signal(signal.SIGINT)
-        output, errors = walker.communicate(timeout=20.0)
+        output, errors = walker.communicate(timeout=PATIENCE)
     finally:
         walker.kill()
     assert walker.returncode == 0, errors

@@ -7,7 +7,7 @@ import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import find_executable
-from nodes_support import START_TIMEOUT, is_served, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, is_served, wait_for
 
 from leg_kinematics.description import robot_from_document
 from leg_kinematics.documents import Document
@@ -24,7 +24,7 @@ objectives: [condition_number, unit_effort_capacity]
 method: {name: samples, designs: 64}
 tolerance: 0.5
 """
-LONG = STUDY.replace("designs: 64", "designs: 100000")
+ENDLESS = STUDY.replace("designs: 64", "designs: 1000000000")
 
 
 @pytest.fixture(scope="module")
@@ -37,28 +37,23 @@ def client(tmp_path_factory):
         start_new_session=True,
     )
     try:
-        with LegClient(namespace="studio", timeout=20.0) as client:
+        with LegClient(namespace="studio", timeout=PATIENCE) as client:
             wait_for(lambda: is_served(client, "search_geometry"), START_TIMEOUT)
             client.results = results
             yield client
             assert node.poll() is None
     finally:
         node.terminate()
-        assert node.wait(20.0) == 0
+        assert node.wait(PATIENCE) == 0
 
 
 def test_a_search_finds_designs_and_a_robot(client, tmp_path):
-    progress = []
-    found = client.search_geometry(STUDY, on_progress=progress.append)
+    found = client.search_geometry(STUDY)
     assert found.evaluated == 64
     assert found.parameters == ("drive_lever", "shank_length")
     assert found.objectives == ("condition_number", "unit_effort_capacity")
     assert found.best_parameters.shape == found.best_objectives.shape
     assert np.all(np.diff(found.best_objectives, axis=0) > 0.0)  # a better one costs the other
-    assert progress[-1].evaluated == progress[-1].total == 64
-    assert progress[-1].best == pytest.approx(
-        [found.best_objectives[0, 0], found.best_objectives[-1, 1]]
-    )
     robot = robot_from_document(Document(tmp_path / "winner", found.robot))
     lengths = [robot.legs["left_front"].geometry.drive_lever]
     lengths.append(robot.legs["left_front"].geometry.shank_length)
@@ -71,9 +66,11 @@ def test_a_search_finds_designs_and_a_robot(client, tmp_path):
 
 def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_path):
     progress = []
-    work = client.search_geometry.future(LONG, tmp_path / "out", on_progress=progress.append)
-    wait_for(lambda: progress and progress[-1].evaluated > 20, 60.0)
+    work = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=progress.append)
+    wait_for(lambda: progress and progress[-1].evaluated > 20)
+    assert progress[-1].total == 10**9
     assert progress[-1].rate > 0.0
+    assert np.isfinite(progress[-1].best).all()
     waiting = client.search_geometry.future(STUDY, tmp_path / "other")
     waiting.cancel()
     with pytest.raises(errors.CancelledError) as caught:
@@ -83,12 +80,12 @@ def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_pa
     with pytest.raises(errors.CancelledError, match="cancelled by the caller after") as caught:
         work.wait()
     partial = caught.value.partial
-    assert 20 < partial.evaluated < 100_000
+    assert 20 < partial.evaluated < 10**9
     assert len(partial.best_parameters)
     assert partial.robot
     heard = []
-    again = client.search_geometry.future(LONG, tmp_path / "out", on_progress=heard.append)
-    wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated, 60.0)
+    again = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=heard.append)
+    wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated)
     again.cancel()
     with pytest.raises(errors.CancelledError):
         again.wait()

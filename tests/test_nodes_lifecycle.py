@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ import rclpy
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses, node_names
-from nodes_support import START_TIMEOUT, set_parameter, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from ruamel.yaml import YAML
@@ -155,7 +154,7 @@ def test_a_node_that_cannot_start_says_why(parameters, words):
         stderr=subprocess.STDOUT,
     )
     with nodes:
-        output, _ = nodes.processes["kinematics"].communicate(timeout=60.0)
+        output, _ = nodes.processes["kinematics"].communicate(timeout=START_TIMEOUT)
     assert nodes.ended() == {"kinematics": 1}
     assert words in output.decode()
     assert "Traceback" not in output.decode()
@@ -167,7 +166,7 @@ TWO_CLIENTS = """
 import numpy as np
 from leg_msgs_py.client import LegClient
 seed = {seed}
-with LegClient(timeout=20.0) as client:
+with LegClient(timeout=60.0) as client:
     feet = client.describe("left_front").initial_foot_position
     feet = feet + np.random.default_rng(seed).uniform(-0.03, 0.03, (50, 3))
     for _ in range(60):
@@ -188,7 +187,7 @@ def test_two_clients_at_once_get_their_own_answers(suite):
         for seed in (1, 2)
     ]
     for script in scripts:
-        output, _ = script.communicate(timeout=60.0)
+        output, _ = script.communicate(timeout=START_TIMEOUT)
         assert (script.returncode, output.decode()) == (0, "all answers were mine\n")
 
 
@@ -206,7 +205,8 @@ def test_many_threads_share_a_client(suite):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(60.0)
+        thread.join(PATIENCE)
+        assert not thread.is_alive()
     assert not wrong
 
 
@@ -223,7 +223,7 @@ class Planner(Node):
 
     def __init__(self, context):
         super().__init__("planner", context=context)
-        self.client = LegClient(node=self, timeout=20.0)
+        self.client = LegClient(node=self, timeout=PATIENCE)
         self.answers = []
         self.timer = self.create_timer(0.01, self.plan)
 
@@ -290,12 +290,12 @@ def test_a_cancelled_call_says_so(suite):
     assert len(suite.client.legs()) == 6
 
 
-def test_without_a_server_the_call_ends_in_time():
+def test_without_a_server_the_call_ends_after_the_time_allowed():
     with LegClient(namespace="nobody/here", timeout=0.3) as client:
-        started = time.monotonic()
-        with pytest.raises(errors.ServerUnavailableError, match="/nobody/here/kinematics"):
+        with pytest.raises(
+            errors.ServerUnavailableError, match=r"/nobody/here/kinematics/.* waited 0\.3 s"
+        ):
             client.inverse_kinematics("left_front", FOOT)
-        assert time.monotonic() - started < 2.0
         with pytest.raises(errors.ServerUnavailableError):
             client.effort_limits()
         with pytest.raises(errors.ServerUnavailableError):
@@ -308,28 +308,28 @@ def test_without_a_server_the_call_ends_in_time():
 def test_a_server_that_hangs_is_a_time_out_and_works_again_later(suite):
     process = suite.nodes.processes["kinematics"]
     with LegClient(timeout=0.5) as client:
-        client.wait_until_ready()
+        client.wait_until_ready(PATIENCE)
         process.send_signal(signal.SIGSTOP)
         try:
             with pytest.raises(errors.TimedOutError, match="no answer"):
                 client.inverse_kinematics("left_front", FOOT)
         finally:
             process.send_signal(signal.SIGCONT)
-        client.caller.timeout = 20.0
+        client.caller.timeout = PATIENCE
         assert client.inverse_kinematics("left_front", FOOT).status == 0
 
 
 def test_a_client_lives_through_a_restart_of_the_nodes():
     outputs = []
     nodes = NodeProcesses(namespace="robot_1", stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    with nodes, LegClient(namespace="robot_1", timeout=30.0) as client:
+    with nodes, LegClient(namespace="robot_1", timeout=START_TIMEOUT) as client:
         client.wait_until_ready(START_TIMEOUT)
         wanted = client.inverse_kinematics("left_front", FOOT).joint_positions
         nodes.processes["kinematics"].send_signal(signal.SIGINT)
         nodes.processes["maps"].send_signal(signal.SIGINT)
         nodes.processes["statics"].send_signal(signal.SIGTERM)
         for process in nodes.processes.values():
-            outputs.append(process.communicate(timeout=10.0)[0].decode())
+            outputs.append(process.communicate(timeout=PATIENCE)[0].decode())
             assert process.returncode == 0
         future = client.inverse_kinematics.future("left_front", FOOT)  # nobody is there
         for name in node_names():
@@ -343,7 +343,7 @@ def test_a_client_lives_through_a_restart_of_the_nodes():
 def test_a_manipulator_with_four_coordinates_is_served():
     with (
         NodeProcesses("gantry", namespace="gantry") as nodes,
-        LegClient(namespace="gantry", timeout=20.0) as client,
+        LegClient(namespace="gantry", timeout=PATIENCE) as client,
     ):
         client.wait_until_ready(START_TIMEOUT)
         arm = client.describe("")
@@ -375,7 +375,7 @@ def test_run_robot_starts_and_stops_all_nodes():
     with LegClient(namespace="tool") as client:
         client.wait_until_ready(START_TIMEOUT)
     tool.send_signal(signal.SIGINT)
-    output = tool.communicate(timeout=20.0)[0].decode()
+    output = tool.communicate(timeout=PATIENCE)[0].decode()
     assert tool.returncode == 0
     assert "Traceback" not in output
     for name in node_names():
@@ -391,7 +391,7 @@ def test_run_robot_tells_when_a_node_dies():
     )
     line = next(line for line in tool.stdout if line.strip().startswith("statics runs as"))
     os.kill(int(line.split()[-1]), signal.SIGKILL)
-    output = tool.communicate(timeout=20.0)[0]
+    output = tool.communicate(timeout=PATIENCE)[0]
     assert tool.returncode == 1
     assert "statics ended by itself" in output
 
@@ -412,7 +412,7 @@ def test_the_demo_shows_everything_and_ends_well(tmp_path):
         [sys.executable, ROOT / "tools" / "demo.py", "--output", tmp_path],
         capture_output=True,
         text=True,
-        timeout=240.0,
+        timeout=START_TIMEOUT,
     )
     assert demo.returncode == 0, demo.stdout + demo.stderr
     for words in ("left_front", "out of reach", "soft ground", "UnknownLegError", "Arrived"):

@@ -7,7 +7,7 @@ import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses
-from nodes_support import START_TIMEOUT
+from nodes_support import PATIENCE, START_TIMEOUT
 from ruamel.yaml import YAML
 
 from leg_kinematics import Status, load_robot
@@ -71,7 +71,7 @@ def zoo(tmp_path_factory):
     robot = load_robot(path)
     with (
         NodeProcesses(str(path), namespace="zoo"),
-        LegClient(namespace="zoo", timeout=30.0) as client,
+        LegClient(namespace="zoo", timeout=PATIENCE) as client,
     ):
         client.wait_until_ready(START_TIMEOUT)
         yield SimpleNamespace(robot=robot, client=client)

@@ -12,7 +12,7 @@ from leg_msgs_py.client import Ground, LegClient
 from leg_msgs_py.recordings.bags import Bag, BagError, BagWriter
 from leg_msgs_py.recordings.definitions import message_definition
 from node_processes import NodeProcesses
-from nodes_support import START_TIMEOUT, set_parameter, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for
 from recorder_support import RecordProcess
 
 from leg_kinematics import load_robot
@@ -81,7 +81,7 @@ def recorded(tmp_path_factory):
     parameters = {"service_events": "contents", "max_points": 1000}
     with (
         NodeProcesses(names=["statics"], namespace="planner", parameters=parameters) as nodes,
-        LegClient(namespace="planner", timeout=20.0) as client,
+        LegClient(namespace="planner", timeout=PATIENCE) as client,
         RecordProcess(folder, "--topics", f"{NODE}/*") as record,
     ):
         wait_for(lambda: client.node.count_publishers(FOOTHOLDS), START_TIMEOUT)

@@ -1,5 +1,6 @@
 """Geometry search: the same designs always, whatever happens on the way."""
 
+import threading
 import tracemalloc
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -257,17 +258,31 @@ def test_a_sample_is_even_and_small():
     assert len(set(np.diff(sample.entries))) == 1
 
 
+class Held(Inline):
+    """Waits at a gate when it has worked for a while."""
+
+    def __init__(self):
+        self.waiting, self.gate = threading.Event(), threading.Event()
+        self._left = 5
+
+    def _submit(self, function, item):
+        self._left -= 1
+        if not self._left:
+            self.waiting.set()
+            self.gate.wait()
+        return super()._submit(function, item)
+
+
 def test_a_job_ends_early_when_cancelled(study, tmp_path):
+    workers = Held()
     with ThreadPoolExecutor(1) as pool:
-        job = SearchJob(study("designs: 96", "designs: 9600"), tmp_path / "out", Inline, pool)
-        while job.progress.evaluated < 10:
-            pass
+        job = SearchJob(study(), tmp_path / "out", lambda: workers, pool)
+        workers.waiting.wait()
         job.cancel()
-        while not job.over:
-            pass
+        workers.gate.set()
     job.check()
     assert not job.complete
-    assert 10 <= job.outcome.progress.evaluated < 12000
+    assert 12 <= job.outcome.progress.evaluated < 96
     assert (tmp_path / "out" / "report.md").exists()
 
 

@@ -1,5 +1,7 @@
 """Maps as jobs: memory, progress, cancellation; and what is best on a map."""
 
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -28,7 +30,7 @@ def pool():
 
 def finished(job):
     while not job.over:
-        pass
+        time.sleep(0.001)
     return job
 
 
@@ -81,15 +83,23 @@ def test_a_job_is_not_done_twice(pool):
     assert finished(MapJob(key_of(), memory, pool)).index_map is first.index_map
 
 
-def test_a_cancelled_job_ends_early_and_is_not_remembered(pool):
-    memory = MapMemory(10**9)
-    key = key_of(resolution=0.004)
+def test_a_cancelled_job_ends_after_the_plane_under_way_and_is_not_remembered(pool, monkeypatch):
+    begun, gate = threading.Event(), threading.Event()
+
+    def held(*args, **options):
+        for index_map in volume_map(*args, **options):
+            begun.set()
+            gate.wait()
+            yield index_map
+
+    monkeypatch.setattr("leg_statics.map_jobs.volume_map", held)
+    memory, key = MapMemory(10**9), key_of()
     job = MapJob(key, memory, pool)
-    while job.progress.fraction == 0.0:
-        pass
+    begun.wait()
     job.cancel()
+    gate.set()
     assert not finished(job).complete
-    assert 0.0 < job.progress.fraction < 1.0
+    assert job.progress.fraction == 1 / len(job.index_map.z)
     assert memory.find(key) is None
 
 
