@@ -160,14 +160,6 @@ def test_interface_is_built_with_the_declared_names(path):
     assert declared <= built
 
 
-def test_the_mathematics_does_not_import_ros():
-    program = "import sys, leg_kinematics, leg_statics; print('rclpy' in sys.modules)"
-    answer = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, check=True, text=True
-    )
-    assert answer.stdout.strip() == "False"
-
-
 def test_no_file_names_a_machine_path_or_a_registry():
     found = [
         f"{path.relative_to(ROOT)}:{number}: {line[:100]}"
