@@ -156,6 +156,15 @@ def modules_of_papers():
     return (ROOT / "leg_statics" / "leg_statics" / "published").glob("paper_*.py")
 
 
+def paths_of_recipes():
+    return sorted(set(re.findall(r"`([\w.-]+/[\w./-]*)`", (ROOT / "CONTRIBUTING.md").read_text())))
+
+
+@pytest.mark.parametrize("path", [p for p in paths_of_recipes() if not p.startswith(".venv/")])
+def test_the_recipes_name_files_that_are_there(path):
+    assert (ROOT / path).exists()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_relative_links_lead_somewhere(page):
     for link in LINK.findall(page.read_text()):

@@ -21,6 +21,7 @@ from leg_kinematics.status import Status
 from leg_statics.efforts import worst_moment_efforts
 from leg_statics.kinematics import Kinematics
 from leg_statics.planar_force import force_transmission
+from leg_statics.workspace import is_spatial_leg
 
 # --------------------------------------------------------------------------- scalar mathematics
 
@@ -171,10 +172,6 @@ def _square(mechanism: Mechanism) -> bool:
     return len(mechanism.joints) == len(mechanism.task_coordinates)
 
 
-def _spatial_leg(mechanism: Mechanism) -> bool:
-    return mechanism.has_point_foot and len(mechanism.joints) == 3
-
-
 def _has_constraints(mechanism: Mechanism) -> bool:
     return mechanism.offers(Mechanism.constraint_jacobian)
 
@@ -204,7 +201,7 @@ INDICES: dict[str, Index] = {
             "high",
             "Largest vertical force at the foot for joint efforts of norm 1.",
             lambda k: unit_effort_capacity(k.jacobian),
-            _spatial_leg,
+            is_spatial_leg,
         ),
         Index(
             "rated_friction",
@@ -214,7 +211,7 @@ INDICES: dict[str, Index] = {
             "low",
             "Friction |F_y / F_z| that the ground must offer to bear that force.",
             lambda k: rated_friction(k.jacobian),
-            _spatial_leg,
+            is_spatial_leg,
         ),
         Index(
             "rated_friction_full",
@@ -224,7 +221,7 @@ INDICES: dict[str, Index] = {
             "low",
             "Friction sqrt(F_x² + F_y²) / F_z that the ground must offer to bear that force.",
             lambda k: rated_friction_full(k.jacobian),
-            _spatial_leg,
+            is_spatial_leg,
         ),
         Index(
             "unit_moment_effort",
@@ -234,7 +231,7 @@ INDICES: dict[str, Index] = {
             "low",
             "Largest joint effort for a unit horizontal moment at the foot (soft ground).",
             lambda k: unit_moment_effort(k.angular_jacobian),
-            _spatial_leg,
+            is_spatial_leg,
         ),
         Index(
             "constraint_force",

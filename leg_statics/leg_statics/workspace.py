@@ -51,7 +51,7 @@ class Section(NamedTuple):
 
 def is_spatial_leg(mechanism: Mechanism) -> bool:
     """Tell whether a mechanism moves a point foot in space, so that its workspace has a volume."""
-    return mechanism.has_point_foot and len(mechanism.joints) >= 3
+    return mechanism.has_point_foot and len(mechanism.joints) == 3
 
 
 def actuator_grid(mechanism: Mechanism, points_per_joint: int) -> FloatArray:

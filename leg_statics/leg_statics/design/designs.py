@@ -31,6 +31,7 @@ from leg_statics.indices import INDICES, Index, supported_indices
 from leg_statics.kinematics import Kinematics
 from leg_statics.maps import CAPACITY_LAYER, layer_values
 from leg_statics.step_length import Criterion, longest_step
+from leg_statics.workspace import is_spatial_leg
 
 STEP_HEIGHTS = 6  # heights that are tried for the longest step
 
@@ -71,15 +72,11 @@ def _has_point_foot(mechanism: Mechanism) -> bool:
     return mechanism.has_point_foot
 
 
-def _moves_in_space(mechanism: Mechanism) -> bool:
-    return _has_point_foot(mechanism) and len(mechanism.joints) == 3
-
-
 METRICS: dict[str, Metric] = {
     metric.name: metric
     for metric in (
         *map(_index_metric, INDICES.values()),
-        Metric(WORKSPACE_VOLUME, "m3", "high", "Volume that the foot can reach.", _moves_in_space),
+        Metric(WORKSPACE_VOLUME, "m3", "high", "Volume that the foot can reach.", is_spatial_leg),
         Metric(
             USABLE_SHARE,
             "1",
