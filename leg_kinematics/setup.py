@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Leg Capacity Developers",
     maintainer_email="maintainers@example.org",
-    description="Kinematics of parallel and hybrid legs, and the node that serves them.",
+    description="Kinematics of legs with closed chains, and the node that serves them.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
     entry_points={

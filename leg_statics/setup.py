@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Leg Capacity Developers",
     maintainer_email="maintainers@example.org",
-    description="What a leg can carry, and the node that serves it.",
+    description="What a leg can carry, better dimensions of it, and the nodes that serve both.",
     license="Apache-2.0",
     extras_require={"test": ["pytest"]},
     entry_points={

@@ -1,7 +1,11 @@
-"""Who may import whom: imports run downward, without a circle, and the mathematics knows no ROS."""
+"""Who may import whom: imports run downward, without a circle, and the mathematics knows no ROS.
+
+The layers are those of the table in docs/architecture.md.
+"""
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from functools import cache
@@ -12,49 +16,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("leg_kinematics", "leg_msgs_py", "leg_statics")
-
-# What the modules of a folder may import beside each other: folders, or single modules.
-MAY_IMPORT = {
-    "leg_kinematics.kernels": {"leg_kinematics.arrays"},
-    "leg_kinematics": {"leg_kinematics.kernels", "leg_kinematics.mechanisms"},
-    "leg_kinematics.mechanisms": {"leg_kinematics", "leg_kinematics.kernels"},
-    "leg_kinematics.nodes": {"leg_kinematics", "leg_msgs_py"},
-    "leg_msgs_py": set(),
-    "leg_msgs_py.client": {"leg_msgs_py"},
-    "leg_msgs_py.recordings": {"leg_msgs_py"},
-    "leg_statics.capacity": {"leg_kinematics", "leg_kinematics.kernels", "leg_statics.efforts"},
-    "leg_statics": {"leg_kinematics", "leg_kinematics.kernels", "leg_statics.capacity"},
-    "leg_statics.drawing": {"leg_kinematics", "leg_statics"},
-    "leg_statics.design": {
-        *("leg_kinematics", "leg_kinematics.mechanisms"),
-        *("leg_statics", "leg_statics.capacity"),
-    },
-    "leg_statics.design.search": {
-        *("leg_kinematics", "leg_kinematics.mechanisms"),
-        *("leg_statics", "leg_statics.design", "leg_statics.drawing"),
-    },
-    "leg_statics.commands": {
-        *("leg_kinematics", "leg_statics", "leg_statics.drawing"),
-        *("leg_statics.design", "leg_statics.design.search"),
-    },
-    "leg_statics.nodes": {
-        *("leg_kinematics", "leg_kinematics.nodes", "leg_msgs_py"),
-        *("leg_statics", "leg_statics.design.search"),
-    },
-    "leg_statics.recordings": {
-        *("leg_kinematics", "leg_kinematics.nodes", "leg_msgs_py", "leg_msgs_py.recordings"),
-        *("leg_statics", "leg_statics.nodes", "leg_statics.commands.command_line"),
-    },
-    # leaves: nobody imports them
-    "leg_statics.published": {
-        *("leg_kinematics", "leg_kinematics.mechanisms"),
-        *("leg_statics", "leg_statics.design", "leg_statics.design.search"),
-    },
-    "leg_statics.published.figures": {
-        *("leg_kinematics", "leg_statics", "leg_statics.published"),
-        *("leg_statics.commands", "leg_statics.drawing"),
-    },
-}
+SPREAD = {"leg_kinematics", "leg_statics"}
+PAGE = ROOT / "docs" / "architecture.md"
 
 # All others can be imported where there is no ROS: rclpy, or packages of messages.
 NEEDS_ROS = {
@@ -96,8 +59,29 @@ def find_modules() -> dict[str, Path]:
 MODULES = find_modules()
 
 
-def folder_of(module: str) -> str:
-    return module if MODULES[module].stem == "__init__" else module.rpartition(".")[0]
+def read_layers(page: str) -> list[set[str]]:
+    """Return the modules and folders of each layer, from the lowest."""
+    table = page[page.index("## Who may import whom") : page.index("## Folders beside")]
+    rows = [line.split("|")[2] for line in table.splitlines() if line.startswith("| ")]
+    names = [set(re.findall(r"`([\w.]+)`", row)) for row in rows]
+    return [row for row in names if row]  # the head of the table names none
+
+
+LAYERS = read_layers(PAGE.read_text())
+
+
+def layer_of(module: str) -> int | None:
+    """Return the number of the layer that names a module, or else the folder it is in.
+
+    The name of a package that is spread over layers stands for its `__init__` only.
+    """
+    name = module
+    while name:
+        for number, layer in enumerate(LAYERS):
+            if name in layer and (name == module or name not in SPREAD):
+                return number
+        name = name.rpartition(".")[0]
+    return None
 
 
 @cache
@@ -113,13 +97,13 @@ def imports_of(module: str) -> set[str]:
     return found & set(MODULES) - {module}
 
 
-def forbidden_imports(may_import: dict[str, set[str]]) -> list[str]:
-    """Return who imports whom against the rules."""
+def upward_imports(imports: dict[str, set[str]]) -> list[str]:
+    """Return who imports from a higher layer."""
     return [
         f"{module} imports {imported}"
-        for module in MODULES
-        for imported in sorted(imports_of(module))
-        if not {imported, folder_of(imported)} & {folder_of(module), *may_import[folder_of(module)]}
+        for module, names in imports.items()
+        for imported in sorted(names)
+        if layer_of(imported) > layer_of(module)
     ]
 
 
@@ -139,13 +123,30 @@ def import_without_ros(modules: list[str], folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_every_module_has_its_layer(module):
+    assert layer_of(module) is not None, f"{PAGE.name} does not say where {module} belongs"
+
+
 def test_imports_run_downward():
-    assert forbidden_imports(MAY_IMPORT) == []
+    assert upward_imports({module: imports_of(module) for module in MODULES}) == []
 
 
-def test_an_import_against_the_rules_is_found():
-    found = forbidden_imports({**MAY_IMPORT, "leg_statics.drawing": {"leg_kinematics"}})
-    assert "leg_statics.drawing.maps imports leg_statics.maps" in found
+def test_an_import_from_a_higher_layer_is_found():
+    drawn = {"leg_statics.drawing.maps": {"leg_statics.maps", "leg_statics.commands.leg_pictures"}}
+    assert upward_imports(drawn) == [
+        "leg_statics.drawing.maps imports leg_statics.commands.leg_pictures"
+    ]
+
+
+def test_nothing_imports_what_is_published_but_itself():
+    importing = [
+        module
+        for module in MODULES
+        if any(name.startswith("leg_statics.published") for name in imports_of(module))
+    ]
+    assert importing
+    assert all(module.startswith("leg_statics.published.") for module in importing)
 
 
 def test_there_is_no_circle():

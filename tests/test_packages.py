@@ -103,7 +103,7 @@ def test_all_packages_have_one_version():
 
 
 @pytest.mark.parametrize("package", PYTHON_PACKAGES)
-def test_what_the_code_imports_is_declared(package):
+def test_what_the_code_imports_is_declared_and_nothing_else(package):
     imported = imported_modules(package) - {package} - set(sys.stdlib_module_names)
     manifest = parse_package(ROOT / package / "package.xml")
     declared = {dependency.name for dependency in manifest.exec_depends}
@@ -113,6 +113,9 @@ def test_what_the_code_imports_is_declared(package):
         if not {name, f"python3-{name}", ROSDEP_KEYS.get(name)} & declared
     }
     assert missing == set()
+    known_as = {key: name for name, key in ROSDEP_KEYS.items()}
+    needed = {known_as.get(name, name.removeprefix("python3-")) for name in declared}
+    assert needed - imported == set()
 
 
 def test_what_rosdep_does_not_know_is_required_and_told():

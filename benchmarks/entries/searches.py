@@ -11,7 +11,7 @@ from harness import Goal, Row, Settings
 
 from leg_kinematics.documents import Document
 from leg_statics.design.search.geometry_search import GeometrySearch
-from leg_statics.design.search.study import study_from_document
+from leg_statics.design.search.study_file import study_from_document
 from leg_statics.design.search.workers import LocalWorkers
 
 PROCESSES = (1, 2)

@@ -140,7 +140,15 @@ def load_leg_types(source: str | os.PathLike[str]) -> dict[str, Leg]:
     Raises:
         DescriptionError: If the file is missing or wrong.
     """
-    document = Document(find_robot_file(source))
+    return leg_types_of(Document(find_robot_file(source)))
+
+
+def leg_types_of(document: Document) -> dict[str, Leg]:
+    """Build a leg of each leg type of a parsed description, in place of the legs it has.
+
+    Raises:
+        DescriptionError: If anything in it is wrong.
+    """
     document.check(ROBOT_SCHEMA)
     mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}
     document.root["legs"] = {

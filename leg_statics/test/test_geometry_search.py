@@ -13,7 +13,7 @@ from leg_statics.design.search.design_table import Design, TableError
 from leg_statics.design.search.geometry_search import EvenSample, GeometrySearch, SearchError
 from leg_statics.design.search.jobs import SearchJob
 from leg_statics.design.search.report import winner_robot, write_results
-from leg_statics.design.search.study import load_study
+from leg_statics.design.search.study_file import load_study
 from leg_statics.design.search.workers import LocalWorkers, Workers
 
 CHEAP = """\

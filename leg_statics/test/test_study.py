@@ -7,7 +7,8 @@ import pytest
 
 from leg_kinematics import DescriptionError, load_robot
 from leg_kinematics.documents import Document, shared_files
-from leg_statics.design.search.study import Constraint, load_study, study_from_document
+from leg_statics.design.search.study import Constraint
+from leg_statics.design.search.study_file import load_study, study_from_document
 from leg_statics.step_length import Criterion
 
 STUDY = """\

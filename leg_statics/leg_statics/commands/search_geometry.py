@@ -14,7 +14,8 @@ from tqdm import tqdm
 from leg_kinematics.documents import shared_files
 from leg_kinematics.errors import LegError
 from leg_statics.design.search.geometry_search import GeometrySearch
-from leg_statics.design.search.study import Study, load_study
+from leg_statics.design.search.study import Study
+from leg_statics.design.search.study_file import load_study
 from leg_statics.design.search.workers import open_workers
 
 BAR_FORMAT = "{percentage:3.0f}% |{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"

@@ -21,7 +21,8 @@ from leg_kinematics.documents import Document
 from leg_kinematics.nodes.robot_node import RobotNode, run
 from leg_statics.design.search.jobs import SearchJob
 from leg_statics.design.search.report import winner_robot
-from leg_statics.design.search.study import Study, study_from_document
+from leg_statics.design.search.study import Study
+from leg_statics.design.search.study_file import study_from_document
 from leg_statics.design.search.workers import open_workers
 from leg_statics.nodes.goal_queue import GoalQueue
 
