@@ -1,6 +1,8 @@
 """What the docs name is there: modules and functions, files of recipes, pages of links."""
 
+import ast
 import importlib
+import importlib.metadata
 import re
 from pathlib import Path
 
@@ -57,6 +59,30 @@ def paths_of_recipes():
 @pytest.mark.parametrize("path", [p for p in paths_of_recipes() if not p.startswith(".venv/")])
 def test_the_recipes_name_files_that_are_there(path):
     assert (ROOT / path).exists()
+
+
+def imported_by_snippets():
+    """What the Python snippets of the README import, as dotted names."""
+    readme = (ROOT / "README.md").read_text()
+    for snippet in re.findall(r"```python\n(.*?)```", readme, re.DOTALL):
+        for node in ast.walk(ast.parse(snippet)):
+            if isinstance(node, ast.ImportFrom):
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("reference", sorted(set(imported_by_snippets())))
+def test_what_the_snippets_of_the_readme_import_exists(reference):
+    assert resolve(reference) is not None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_commands_that_a_page_names_exist(page):
+    text = page.read_text()
+    for package, command in re.findall(r"ros2 run (\w+) (\w+)", text):
+        scripts = importlib.metadata.distribution(package).entry_points.select(name=command)
+        assert scripts, command
+    targets = re.findall(r"^([a-z-]+):.*## ", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert set(re.findall(r"`make ([a-z-]+)", text)) <= {*targets}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
