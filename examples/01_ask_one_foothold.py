@@ -11,7 +11,7 @@ from leg_msgs_py.client import LegClient
 from leg_msgs_py.errors import ServerUnavailableError
 
 LEG = "right_front"
-FOOTHOLD = [0.05, 0.10, -0.65]  # x to the right, y forward, z up from the hip [m]
+FOOTHOLD = [0.10, -0.05, -0.65]  # x forward, y left, z up from the hip [m]
 LOAD = 500.0  # N
 
 with LegClient(timeout=10.0) as client:
@@ -25,6 +25,7 @@ print(f"{LEG} at {FOOTHOLD} m on cement (mu = {answer.friction_coefficient:g}):"
 print(f"  carries {LOAD:g} N:   {'yes' if answer.feasible else 'no'}")
 print(f"  at most:         {answer.load_capacity:.0f} N")
 print(f"  rated friction:  {answer.rated_friction:.2f}, margin {answer.friction_margin:.2f}")
+print(f"  in full:         {answer.rated_friction_full:.2f} with the lateral component")
 print(f"  hardest joint:   {joint}, {100 * answer.utilisation:.0f} % of its limit")
 for name, effort in zip(answer.joint_names, answer.joint_efforts, strict=True):
     print(f"  {name}: {effort:.1f} N.m")

@@ -15,7 +15,7 @@ from leg_msgs_py.errors import ServerUnavailableError
 
 LEG = "left_middle"
 LOAD = 500.0  # N
-LOW, HIGH = [-0.3, -0.4, -0.75], [0.3, 0.2, -0.5]  # box of candidates in the leg's own frame [m]
+LOW, HIGH = [-0.4, -0.3, -0.75], [0.2, 0.3, -0.5]  # box of candidates in the leg's own frame [m]
 REASONS = ("REACH", "JOINT_RANGE", "PASSIVE_JOINT", "SINGULAR", "FRICTION", "EFFORT")
 
 candidates = np.random.default_rng(1).uniform(LOW, HIGH, size=(10_000, 3))

@@ -66,8 +66,8 @@ def plot_terrain(terrain: Terrain, half_steps: Sequence[HalfStep]) -> Figure:
             }
             ax.plot(*places[:, :2].T, linestyle=":", linewidth=0.8, markersize=6, zorder=4, **style)
     ax.set_aspect("equal")
-    ax.set_xlabel("x [m], walking direction", fontsize=SMALL + 1)
-    ax.set_ylabel("y [m]", fontsize=SMALL + 1)
+    ax.set_xlabel("x [m], forward", fontsize=SMALL + 1)
+    ax.set_ylabel("y [m], left", fontsize=SMALL + 1)
     ax.tick_params(labelsize=SMALL)
     figure.legend(
         handles=_legend(),

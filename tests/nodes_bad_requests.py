@@ -6,7 +6,7 @@ import math
 
 from nodes_support import MAX_POINTS
 
-P = [0.0, -0.1, -0.65]
+P = [-0.1, 0.0, -0.65]
 J = "left_front_crank_1"
 
 # service, fields, error code, words that the message must have

@@ -18,7 +18,7 @@ from leg_kinematics import load_robot
 from leg_kinematics.status import Status
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import joint_efforts, utilisation
-from leg_statics.indices import condition_number, rated_friction
+from leg_statics.indices import condition_number, rated_friction, rated_friction_full
 from leg_statics.joint_stream import JointStream
 from leg_statics.recordings import bag_judge
 from leg_statics.recordings import findings as judge_findings
@@ -34,7 +34,7 @@ PLAIN = Topics()
 SAME = {"rtol": 1e-12, "atol": 1e-12}
 STATE_FIELDS = (
     *("status", "foot_position", "foot_velocity", "condition_number", "load_capacity"),
-    *("rated_friction", "utilisation"),
+    *("rated_friction", "rated_friction_full", "utilisation"),
 )
 
 
@@ -101,6 +101,7 @@ def test_judgements_equal_direct_calls_of_the_library(path, robot):
                 "condition_number": condition_number(jacobian),
                 "load_capacity": load_capacity(jacobian, lower, upper, 0.4).capacity,
                 "rated_friction": rated_friction(jacobian),
+                "rated_friction_full": rated_friction_full(jacobian),
                 "utilisation": utilisation(message.effort[columns], leg.effort_limits)[0],
                 "joint_utilisation": np.abs(message.effort[columns]) / upper,
             }

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parent.parent
-FOOT = [0.0, -0.1, -0.65]
+FOOT = [-0.1, 0.0, -0.65]
 JOINT = "left_front_crank_1"
 
 
@@ -211,7 +211,7 @@ def test_many_threads_share_a_client(suite):
 
 
 def test_many_requests_may_be_under_way(suite):
-    feet = np.linspace(FOOT, np.add(FOOT, [0.0, 0.03, 0.0]), 300)
+    feet = np.linspace(FOOT, np.add(FOOT, [0.03, 0.0, 0.0]), 300)
     futures = [suite.client.inverse_kinematics.future("left_front", foot) for foot in feet]
     joints = [future.wait().joint_positions for future in futures]
     back = suite.client.forward_kinematics("left_front", joints)

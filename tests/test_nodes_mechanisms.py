@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
+from leg_msgs_py.grounds import Ground
 from node_processes import NodeProcesses
 from nodes_support import PATIENCE, START_TIMEOUT
 from ruamel.yaml import YAML
@@ -30,7 +31,7 @@ def mixed_description() -> dict:
         assert document["units"] == {"length": "mm", "angle": "deg"}
         for name, leg_type in document["leg_types"].items():
             types[f"{robot}_{name}"] = leg_type
-            mount = {"position": [0, 100 * len(legs), 0], "rpy": [0, 0, -90]}
+            mount = {"position": [0, 100 * len(legs), 0], "rpy": [0, 0, 30]}
             legs[f"{robot}_{name}"] = {"type": f"{robot}_{name}", "mount": mount}
     jansen = MECHANISMS["theo_jansen"]()
     types["jansen"] = {
@@ -43,7 +44,7 @@ def mixed_description() -> dict:
         "passive_joint_limits": {j.name: [-180, 180] for j in jansen.passive_joints},
         "effort_limits": {j.name: 1.0 for j in jansen.joints},
     }
-    mount = {"position": [0, -100, 0], "rpy": [0, 0, -90]}
+    mount = {"position": [0, -100, 0], "rpy": [0, 0, 30]}
     legs["jansen"] = {"type": "jansen", "mount": mount}
     return {
         "name": "zoo",
@@ -125,6 +126,43 @@ def test_kinematics_equal_the_library(zoo, name):
     np.testing.assert_allclose(
         answer.angular_jacobian, leg.mechanism.angular_jacobian(posture), rtol=1e-9, atol=1e-12
     )
+
+
+@every_leg
+def test_a_turned_mount_turns_every_vector(zoo, name):
+    leg, base = zoo.robot.leg(name), zoo.robot.base_frame
+    if not leg.mechanism.has_point_foot:
+        return
+    assert not np.allclose(leg.mount.rotation, np.eye(3))
+    foot = postures(leg).foot_position
+    there = leg.mount.to_base(foot)
+    turned = leg.mount.vectors_to_base
+    own = zoo.client.inverse_kinematics(name, foot)
+    ik = zoo.client.inverse_kinematics(name, there, frame=base)
+    np.testing.assert_allclose(ik.joint_positions, own.joint_positions, atol=1e-9)
+    fk = zoo.client.forward_kinematics(name, own.joint_positions, frame=base)
+    reached = zoo.client.forward_kinematics(name, own.joint_positions)
+    np.testing.assert_allclose(fk.positions, leg.mount.to_base(reached.positions), atol=1e-12)
+    jacobian = zoo.client.jacobian(name, joint_positions=own.joint_positions, frame=base)
+    wanted = zoo.client.jacobian(name, joint_positions=own.joint_positions)
+    for field in ("jacobian", "angular_jacobian"):
+        rows = leg.mount.rotation @ getattr(wanted, field)
+        np.testing.assert_allclose(getattr(jacobian, field), rows, rtol=1e-9, atol=1e-12)
+    held = zoo.client.compute_efforts(name, there, turned(FORCE), turned(FORCE), frame=base)
+    wanted = zoo.client.compute_efforts(name, foot, FORCE, FORCE)
+    np.testing.assert_allclose(held.joint_efforts, wanted.joint_efforts, rtol=1e-7, atol=1e-9)
+    slope = np.array([0.2, -0.1, 1.0])
+    carried = zoo.client.query_footholds(name, there, Ground(0.4, turned(slope)), frame=base)
+    wanted = zoo.client.query_footholds(name, foot, Ground(0.4, slope))
+    np.testing.assert_array_equal(carried.verdict, wanted.verdict)
+    np.testing.assert_allclose(carried.load_capacity, wanted.load_capacity, rtol=1e-6)
+    height = float(np.median(foot[:, 2]))
+    oblique = np.array([1.0, 0.3, 0.0])  # forward, a symmetric leg has two steps of one length
+    step = zoo.client.query_step_length(
+        name, height + leg.mount.position[2], 0.4, 5.0, direction=turned(oblique), frame=base
+    )
+    wanted = zoo.client.query_step_length(name, height, 0.4, 5.0, direction=oblique)
+    np.testing.assert_allclose(step.starts, leg.mount.to_base(wanted.starts), atol=1e-5)
 
 
 @every_leg

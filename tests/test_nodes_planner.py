@@ -21,7 +21,7 @@ SLOPE = (0.2, -0.1, 1.0)
 SAME = {"rtol": 1e-9, "atol": 1e-9}
 
 
-def candidates(leg, shape=(3, 40)):
+def candidates(leg, shape=(3, 80)):
     """Return candidates about the initial foothold, of every verdict but FRICTION, one with NaN."""
     rng = np.random.default_rng(3)
     feet = leg.mechanism.initial_posture.foot_position + rng.uniform(-0.35, 0.35, (*shape, 3))
@@ -167,7 +167,7 @@ def test_the_step_of_a_leg_equals_the_library(suite, hexapod, by_rated_friction)
         heights,
         Contact(0.08, load=300.0),
         lateral_offset=0.03,
-        direction=(0.3, 1.0, 0.0),
+        direction=(1.0, 0.3, 0.0),
         criterion=Criterion(by_rated_friction),
     )
     answer = suite.client.query_step_length(
@@ -176,7 +176,7 @@ def test_the_step_of_a_leg_equals_the_library(suite, hexapod, by_rated_friction)
         "ice",
         300.0,
         lateral_offsets=[0.03],
-        direction=[0.3, 1.0, 0.0],
+        direction=[1.0, 0.3, 0.0],
         by_rated_friction=by_rated_friction,
     )
     assert answer.legs == (LEG,)
@@ -188,6 +188,7 @@ def test_the_step_of_a_leg_equals_the_library(suite, hexapod, by_rated_friction)
     np.testing.assert_array_equal(answer.end_limits[0], wanted.end_limit)
     np.testing.assert_allclose(answer.load_capacity[0], wanted.load_capacity, rtol=1e-6)
     np.testing.assert_allclose(answer.rated_friction[0], wanted.rated_friction, **SAME)
+    np.testing.assert_allclose(answer.rated_friction_full[0], wanted.rated_friction_full, **SAME)
     np.testing.assert_allclose(answer.common_lengths, wanted.length, **SAME)
     assert answer.best_height == np.argmax(wanted.length)
     assert answer.lengths[0, 1, 1] == 0.0
@@ -239,7 +240,7 @@ def test_a_height_that_no_leg_reaches_has_no_best(suite):
 
 # --------------------------------------------------------------------------- bad requests
 
-P = [0.0, -0.1, -0.65]
+P = [-0.1, 0.0, -0.65]
 CEMENT = GroundMessage(name="cement")
 
 # fields, error code, words that the message must have

@@ -16,7 +16,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from leg_statics.capacity.problem import load_capacity
-from leg_statics.indices import condition_number, rated_friction
+from leg_statics.indices import condition_number, rated_friction, rated_friction_full
 
 DEEP = QoSProfile(depth=2000)
 
@@ -112,6 +112,7 @@ def test_all_values_equal_the_library(stream, hexapod):
     np.testing.assert_allclose(state.foot_velocity, jacobian @ rates, **same)
     np.testing.assert_allclose(state.condition_number, condition_number(jacobian), **same)
     np.testing.assert_allclose(state.rated_friction, rated_friction(jacobian), **same)
+    np.testing.assert_allclose(state.rated_friction_full, rated_friction_full(jacobian), **same)
     wanted = load_capacity(jacobian, lower, upper, 0.4).capacity
     np.testing.assert_allclose(state.load_capacity, wanted, **same)
     assert state.utilisation == 0.5
@@ -261,7 +262,7 @@ def test_a_flood_is_left_out_counted_and_over_when_it_ends(stream, suite):
     while stream.dropped() == before:
         for _ in range(20_000):
             stream.publisher.publish(flood)
-    footholds = suite.client.query_footholds("left_front", [0.0, -0.1, -0.65], 0.4, load=100.0)
+    footholds = suite.client.query_footholds("left_front", [-0.1, 0.0, -0.65], 0.4, load=100.0)
     assert footholds.load_capacity > 100.0
     assert stream.ask(LEFT_FRONT, JOINTS)["left_front"].status == PointStatus.OK
     assert suite.nodes.ended() == {}

@@ -91,6 +91,7 @@ def states_by_elementary_calls(robot, messages):
                     condition_number=float(indices["condition_number"][k]),
                     load_capacity=float(capacity[k]),
                     rated_friction=float(indices["rated_friction"][k]),
+                    rated_friction_full=float(indices["rated_friction_full"][k]),
                     utilisation=float(used[k]),
                 )
             )
@@ -155,11 +156,12 @@ def message_of(stamp, frame, states):
                 condition_number=float(condition),
                 load_capacity=float(capacity),
                 rated_friction=float(mu),
+                rated_friction_full=float(mu_full),
                 utilisation=float(used),
             )
-            for leg, (joints, status, foot, velocity, condition, capacity, mu, used) in zip(
-                states.legs, fields, strict=True
-            )
+            for leg, (
+                *(joints, status, foot, velocity, condition, capacity, mu, mu_full, used),
+            ) in zip(states.legs, fields, strict=True)
         ],
     )
 

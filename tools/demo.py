@@ -38,7 +38,7 @@ DISTANCE = 3.0  # of the walk [m]
 LOAD = 600.0  # on one foot [N]
 GROUNDS = ("ice", "wood", "cement")
 OFFSETS = np.array(  # candidate footholds, from the initial foot position [m]
-    [[0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.05, -0.2, 0.05], [0.0, 0.0, 0.15], [0.0, 0.0, -0.3]]
+    [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [-0.2, -0.05, 0.05], [0.0, 0.0, 0.15], [0.0, 0.0, -0.3]]
 )
 HEIGHTS = np.array([0.50, 0.55, 0.60, 0.65, 0.70, 0.75])  # of the body over the ground [m]
 WRAPPED = ("message of the node",)  # columns of long texts
@@ -156,7 +156,8 @@ def show_footholds(client: LegClient, leg: LegDescription) -> None:
     """Show what a leg can carry at candidate footholds, on each ground."""
     feet = leg.initial_foot_position + OFFSETS
     title = f"query_footholds: can {leg.leg} bear {LOAD:g} N there?"
-    columns = ("foothold [m]", "capacity [N]", "mu_e", "effort used", "limiting joint", "verdict")
+    answers = ("capacity [N]", "mu_e", "mu_e,xy", "effort used", "limiting joint", "verdict")
+    columns = ("foothold [m]", *answers)
     table = new_table(title, "ground", *columns)
     for ground in GROUNDS:
         answer = client.query_footholds(leg.leg, feet, ground, LOAD)
@@ -167,6 +168,7 @@ def show_footholds(client: LegClient, leg: LegDescription) -> None:
                 vector(foot),
                 number(answer.load_capacity[k], 0),
                 number(answer.rated_friction[k], 2),
+                number(answer.rated_friction_full[k], 2),
                 f"{100 * answer.utilisation[k]:.0f} %" if joint >= 0 else "-",
                 leg.joint_names[joint].removeprefix(f"{leg.leg}_") if joint >= 0 else "-",
                 VERDICTS[int(answer.verdict[k])],

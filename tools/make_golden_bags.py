@@ -150,8 +150,8 @@ def _foot(walk: Walk, leg: Leg, phase: FloatArray) -> FloatArray:
     neutral = leg.mechanism.initial_posture.foot_position
     return np.stack(
         [
-            np.full_like(phase, neutral[0]),
-            neutral[1] + walk.stride * back,
+            neutral[0] + walk.stride * back,
+            np.full_like(phase, neutral[1]),
             walk.height + walk.lift * rise,
         ],
         axis=-1,
@@ -165,7 +165,7 @@ def _ground_reaction(phase: FloatArray, load: float) -> FloatArray:
     """
     share = np.clip(np.minimum(phase, 0.5 - phase) / 0.05, 0.0, 1.0)
     vertical = load * share
-    force = np.stack([np.zeros_like(phase), 0.1 * (4.0 * phase - 1.0) * vertical, vertical], -1)
+    force = np.stack([0.1 * (4.0 * phase - 1.0) * vertical, np.zeros_like(phase), vertical], -1)
     return _rounded(force, FORCE_STEP)
 
 

@@ -74,4 +74,4 @@ class Chain:
         jacobian, _ = self.leg.jacobians(self.leg.solve(foot, start))
         inverse = np.linalg.inv(jacobian)  # rows: efforts, columns: forces
         force = inverse.T @ inverse[:, 2]  # of the unit efforts that maximise F_z
-        return self._solver.capacity(jacobian), abs(force[1] / force[2])
+        return self._solver.capacity(jacobian), abs(force[0] / force[2])

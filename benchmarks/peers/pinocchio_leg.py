@@ -15,6 +15,7 @@ import numpy as np
 
 from leg_kinematics import ParallelDrive, Posture
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.mechanisms.walking_axes import leg_vectors
 
 TOLERANCE = 1e-10  # of the equations [m, m², rad]
 MOST_STEPS = 20
@@ -32,11 +33,15 @@ class PinocchioLeg:
         m = mechanism
         self._zeros = np.array([m.crank_zero, m.crank_zero, m.center_crank_zero])
         self._rod_square = m.rod_length**2
-        self._hip = np.array([0.0, m.hip_forward, -m.hip_drop])
+        # the tree is the paper's, turned into the leg frame where its first joints stand
+        axes = leg_vectors(np.eye(3)).T
+        self._hip = axes @ [0.0, m.hip_forward, -m.hip_drop]
         model = pin.Model()
 
         def joint(parent: int, kind: Any, x: float, y: float, z: float, name: str) -> int:
             place = pin.SE3(np.eye(3), np.array([x, y, z]))
+            if parent == 0:
+                place = pin.SE3(axes, np.zeros(3)) * place
             return int(model.addJoint(parent, kind(), place, name))
 
         def point(body: int, x: float, y: float, z: float, name: str) -> int:

@@ -15,7 +15,7 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
     legs:
       left_front:
         type: initial
-        mount: {position: [500, 250, 0], rpy: [0, 0, -90]}
+        mount: {position: [500, 250, 0], rpy: [0, 0, 0]}  # rpy optional, default no rotation
         mirrored: true                                  # optional, default false
         frame: left_front_leg                           # optional, default <leg>_leg
         joint_names: {crank_1: lf_motor_1, ...}         # optional, default <leg>_<joint>
@@ -82,9 +82,7 @@ ROBOT_SCHEMA = mapping_schema(
             mapping_schema(
                 {
                     "type": NAME,
-                    "mount": mapping_schema(
-                        {"position": VECTOR, "rpy": VECTOR}, ["position", "rpy"]
-                    ),
+                    "mount": mapping_schema({"position": VECTOR, "rpy": VECTOR}, ["position"]),
                     "mirrored": {"type": "boolean"},
                     "frame": NAME,
                     "joint_names": {"type": "object"},
@@ -256,7 +254,8 @@ def _leg(
     mount = entry["mount"]
     from scipy.spatial.transform import Rotation  # slow to import, and only needed here
 
-    rotation = Rotation.from_euler("xyz", np.array(mount["rpy"], float) * units["angle"])
+    rpy = np.array(mount.get("rpy", (0.0, 0.0, 0.0)), dtype=np.float64)
+    rotation = Rotation.from_euler("xyz", rpy * units["angle"])
     return Leg(
         name=name,
         leg_type=leg_type,

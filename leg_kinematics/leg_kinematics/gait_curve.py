@@ -2,7 +2,7 @@
 
 The two legs of a unit share a frame and their cranks stand half a turn apart, so the lower foot
 carries the body for half a turn each. Works with any mechanism that has one actuator which turns
-endlessly and a foot that stays in a plane x = const.
+endlessly and a foot that stays in a plane y = const.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class GaitCurve:
     @property
     def length(self) -> float:
         """Extent of the whole curve in the walking direction [m]."""
-        return float(np.ptp(self.foot[:, 1]))
+        return float(np.ptp(self.foot[:, 0]))
 
     @cached_property
     def support(self) -> FloatArray:
@@ -66,7 +66,7 @@ class GaitCurve:
     @property
     def stride(self) -> float:
         """How far the body moves while one foot carries it [m]; twice that in a crank turn."""
-        return float(np.ptp(self.support[:, 1]))
+        return float(np.ptp(self.support[:, 0]))
 
     @property
     def flatness(self) -> float:
@@ -75,13 +75,13 @@ class GaitCurve:
 
     @property
     def body_path(self) -> FloatArray:
-        """Path of the body over one step of a two-leg unit (k, 2) [m]: y from the start, z.
+        """Path of the body over one step of a two-leg unit (k, 2) [m]: x from the start, z.
 
         From r_GD = r_D - r_G, equation (18), where the paper misprints r_D - 2 r_G. The carrying
         foot does not slip; the body's point is the origin of the leg frame, z its height.
         """
         path = self.support
-        return np.stack([path[0, 1] - path[:, 1], -path[:, 2]], axis=-1)
+        return np.stack([path[0, 0] - path[:, 0], -path[:, 2]], axis=-1)
 
     @property
     def body_fluctuation(self) -> float:

@@ -99,10 +99,10 @@ class Linkage(NamedTuple):
 class Mechanism(ABC):
     """A leg mechanism in SI units: immutable, hashable, picklable.
 
-    Leg frame: z up, y the walking direction, x to the side. All arrays follow the one shape rule:
-    any leading batch axes, the same leading axes back. n is the number of actuated joints, p that
-    of passive ones, e that of excursions, t that of the task coordinates: the foot's x, y, z, and
-    for a manipulator its orientation after them.
+    Leg frame: x forward, y left, z up (REP-103). All arrays follow the one shape rule: any leading
+    batch axes, the same leading axes back. n is the number of actuated joints, p that of passive
+    ones, e that of excursions, t that of the task coordinates: the foot's x, y, z, and for a
+    manipulator its orientation after them.
 
     A mechanism defines what is abstract; class attributes serve as properties. It overrides the
     twist methods where one pass is cheaper than its parts, and the abilities that it has of those

@@ -13,9 +13,9 @@ from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Mechanism, Posture
 
-# Reflection at the plane x = 0: a vector keeps its y and z, an axial vector (rotation, moment)
-# keeps its x.
-VECTOR = np.array([-1.0, 1.0, 1.0])
+# Reflection at the plane y = 0: a vector keeps its x and z, an axial vector (rotation, moment)
+# keeps its y.
+VECTOR = np.array([1.0, -1.0, 1.0])
 AXIAL = -VECTOR
 WRENCH = np.concatenate([VECTOR, AXIAL])
 VECTOR_ROWS, AXIAL_ROWS = VECTOR[:, None], AXIAL[:, None]  # of Jacobians
@@ -34,9 +34,9 @@ def without_reflection(mechanism: Mechanism) -> tuple[Mechanism, FloatArray]:
 
 @dataclass(frozen=True)
 class Mirrored(Mechanism):
-    """A mechanism reflected at x = 0; the leg frame stays right-handed.
+    """A mechanism reflected at y = 0; the leg frame stays right-handed.
 
-    Joint positions keep their meaning: an actuator whose axis is parallel to x turns the same way
+    Joint positions keep their meaning: an actuator whose axis is parallel to y turns the same way
     in the mirror image, and stands on the other side. What else a mechanism has beyond the protocol
     is asked of its `original`.
 

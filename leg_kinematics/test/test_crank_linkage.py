@@ -78,10 +78,10 @@ def test_crank_and_frame_stand_where_they_should(leg):
     linkage = leg.linkage(leg.forward(TURN))
     index = linkage.names.index
     angle = leg.crank_zero + TURN[:, 0]
-    pin = np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=-1) * leg.crank_length
+    pin = np.stack([-np.cos(angle), 0 * angle, np.sin(angle)], axis=-1) * leg.crank_length
     np.testing.assert_allclose(linkage.points[:, index("B")], pin, atol=1e-15)
     frame = leg.frame_length * leg.crank_length
-    pivot = [0.0, -frame * math.cos(leg.frame_angle), frame * math.sin(leg.frame_angle)]
+    pivot = [-frame * math.cos(leg.frame_angle), 0.0, frame * math.sin(leg.frame_angle)]
     np.testing.assert_allclose(linkage.points[0, index("D")], pivot, atol=1e-15)
 
 
@@ -90,7 +90,7 @@ def test_the_crank_turns_all_the_way_round_and_the_foot_is_g(leg):
     posture = leg.forward(TURN)
     assert (posture.status == Status.OK).all()
     np.testing.assert_array_equal(posture.foot_position, leg.linkage(posture).points[:, -1])
-    np.testing.assert_array_equal(posture.foot_position[:, 0], 0.0)
+    np.testing.assert_array_equal(posture.foot_position[:, 1], 0.0)
 
 
 @legs
@@ -136,13 +136,13 @@ def test_angular_jacobian_is_the_turning_of_the_foot_link(leg):
         linkage = leg.linkage(leg.forward(q))
         index = linkage.names.index
         bar = linkage.points[:, index("F")] - linkage.points[:, index("C")]
-        return np.arctan2(bar[:, 2], bar[:, 1])  # about +x of the leg frame
+        return np.arctan2(bar[:, 0], bar[:, 2])  # about +y of the leg frame
 
     q = posture.joint_positions
     slope = np.angle(np.exp(1j * (angle(q + step) - angle(q - step)))) / (2 * step)
     found = leg.angular_jacobian(posture)
-    np.testing.assert_allclose(found[:, 0, 0], slope, rtol=1e-6, atol=1e-6)
-    np.testing.assert_array_equal(found[:, 1:], 0.0)
+    np.testing.assert_allclose(found[:, 1, 0], slope, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(found[:, ::2], 0.0)
 
 
 @legs
@@ -168,10 +168,10 @@ def test_inverse_finds_the_crank_angle(leg):
 def test_nearest_pass_beats_a_fine_search(leg):
     rng = np.random.default_rng(3)
     points = rng.uniform(-7, 3, (40, 3)) * leg.crank_length
-    points[:, 0] *= 0.1
+    points[:, 1] *= 0.1
     passes = leg.nearest_crank_angles(points)
     feet = leg.forward(np.linspace(-math.pi, math.pi, 40_000)[:, None]).foot_position
-    feet = feet[np.isfinite(feet[:, 1])]
+    feet = feet[np.isfinite(feet[:, 0])]
     least = np.linalg.norm(points[:, None] - feet, axis=-1).min(axis=1)
     assert (passes.distances[:, 0] <= least + 1e-12).all()
     there = leg.forward(passes.crank_angles[:, :1]).foot_position
@@ -183,35 +183,35 @@ def test_nearest_pass_beats_a_fine_search(leg):
 
 
 @turning
-def test_crank_angles_at_a_y_are_all_its_passes(leg):
-    feet = leg.forward(TURN).foot_position
-    y = np.linspace(feet[:, 1].min() - 0.01, feet[:, 1].max() + 0.01, 101)
-    angles = leg.crank_angles_at(y)
-    reached = (y >= feet[:, 1].min()) & (y <= feet[:, 1].max())
-    ahead = np.append(feet[:, 1], feet[0, 1])[:, None] > y
+def test_crank_angles_at_an_x_are_all_its_passes(leg):
+    feet = leg.forward(TURN).foot_position[:, 0]
+    x = np.linspace(feet.min() - 0.01, feet.max() + 0.01, 101)
+    angles = leg.crank_angles_at(x)
+    reached = (x >= feet.min()) & (x <= feet.max())
+    ahead = np.append(feet, feet[0])[:, None] > x
     np.testing.assert_array_equal(
         np.isfinite(angles).sum(axis=-1), (ahead[1:] != ahead[:-1]).sum(axis=0)
     )
     assert reached.any()
-    found = leg.forward(angles[..., None]).foot_position[..., 1]
-    np.testing.assert_allclose((found - y[:, None])[np.isfinite(angles)], 0.0, atol=1e-12)
+    found = leg.forward(angles[..., None]).foot_position[..., 0]
+    np.testing.assert_allclose((found - x[:, None])[np.isfinite(angles)], 0.0, atol=1e-12)
 
 
-def test_crank_angles_at_a_y_where_the_crank_only_swings():
-    feet = SWINGING.forward(TURN).foot_position[:, 1]
-    y = np.linspace(np.nanmin(feet), np.nanmax(feet), 50)[1:-1]
-    angles = SWINGING.crank_angles_at(y)
-    crossings = (feet[:-1, None] < y) != (feet[1:, None] < y)
+def test_crank_angles_at_an_x_where_the_crank_only_swings():
+    feet = SWINGING.forward(TURN).foot_position[:, 0]
+    x = np.linspace(np.nanmin(feet), np.nanmax(feet), 50)[1:-1]
+    angles = SWINGING.crank_angles_at(x)
+    crossings = (feet[:-1, None] < x) != (feet[1:, None] < x)
     crossings &= np.isfinite(feet[:-1] + feet[1:])[:, None]
     assert (np.isfinite(angles).sum(axis=-1) >= crossings.sum(axis=0)).all()
-    found = SWINGING.forward(angles[..., None]).foot_position[..., 1]
-    np.testing.assert_allclose((found - y[:, None])[np.isfinite(found)], 0.0, atol=1e-12)
+    found = SWINGING.forward(angles[..., None]).foot_position[..., 0]
+    np.testing.assert_allclose((found - x[:, None])[np.isfinite(found)], 0.0, atol=1e-12)
 
 
 @turning
 def test_a_foothold_off_the_curve_is_unreachable(leg):
     foot = leg.forward([0.4]).foot_position
-    normal = np.cross(leg.jacobian(leg.forward([0.4]))[:, 0], [1.0, 0.0, 0.0])
+    normal = np.cross(leg.jacobian(leg.forward([0.4]))[:, 0], [0.0, 1.0, 0.0])
     normal /= np.linalg.norm(normal)
     near, far = (foot + k * leg.reach_tolerance * normal for k in (0.99, 1.01))
     assert leg.inverse(near).status == Status.OK
@@ -219,7 +219,7 @@ def test_a_foothold_off_the_curve_is_unreachable(leg):
     assert missed.status == Status.UNREACHABLE
     assert np.isnan(missed.joint_positions).all()
     assert (
-        leg.inverse(foot + np.array([2 * leg.reach_tolerance, 0, 0])).status == Status.UNREACHABLE
+        leg.inverse(foot + np.array([0, 2 * leg.reach_tolerance, 0])).status == Status.UNREACHABLE
     )
 
 

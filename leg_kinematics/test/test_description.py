@@ -44,10 +44,17 @@ def test_hexapod_has_six_legs_mirrored_left_to_right():
     np.testing.assert_allclose(q.joint_positions, q_left.joint_positions, atol=1e-14)
 
 
-def test_leg_frame_looks_forward_right_up():
-    mount = load_robot("hexapod").leg("right_middle").mount
-    axes = mount.vectors_to_base(np.eye(3))  # x, y, z of the leg frame in the base frame
-    np.testing.assert_allclose(axes, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+@pytest.mark.parametrize("robot", ["hexapod", "quadruped", "walker"])
+def test_axes_of_legs_are_those_of_the_body(robot):
+    for leg in load_robot(robot).legs.values():
+        np.testing.assert_array_equal(leg.mount.rotation, np.eye(3))
+
+
+def test_a_mount_turns_a_leg_and_back(edited):
+    turned = edited("position: [450, -300, 0]", "position: [450, -300, 0], rpy: [0, 0, 30]")
+    mount = load_robot(turned).leg("right_front").mount
+    forward = mount.vectors_to_base([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(forward, [np.cos(np.pi / 6), 0.5, 0.0], atol=1e-15)
     points = np.random.default_rng(0).normal(size=(4, 5, 3))
     np.testing.assert_allclose(mount.to_leg(mount.to_base(points)), points, atol=1e-15)
 
@@ -105,7 +112,7 @@ MISTAKES = {
     "duplicate key": ("name: hexapod", "name: a\nname: hexapod", ["duplicate key"]),
     "unknown top-level key": ("name: hexapod", "name: hexapod\nnmae: x", ["nmae", "allowed"]),
     "bad leg name": ("  left_front:", "  left front:", ["left front"]),
-    "short vector": ("rpy: [0, 0, -90]", "rpy: [0, 0]", ["legs.left_front.mount.rpy", "short"]),
+    "short vector": ("position: [450, 300, 0]", "position: [450, 300, 0], rpy: [0, 0]", ["legs.left_front.mount.rpy", "short"]),
     "NaN in a mount": ("[450, 300, 0]", "[450, .nan, 0]", ["mount.position.1", "nan"]),
     "text for a boolean": ("mirrored: true", "mirrored: maybe", ["mirrored", "boolean"]),
     "joint name used twice": (

@@ -45,7 +45,7 @@ legs = pytest.mark.parametrize("leg", [LEG, ODD, Mirrored(LEG)], ids=["paper", "
 def foot_at(phi, radius, psi_s=0.0):
     """Foot of swing phi, radius OI and side swing psi_s."""
     x, z = -radius * np.sin(phi), -radius * np.cos(phi)
-    return np.stack(np.broadcast_arrays(z * np.sin(psi_s), x, z * np.cos(psi_s)), axis=-1)
+    return np.stack(np.broadcast_arrays(x, -z * np.sin(psi_s), z * np.cos(psi_s)), axis=-1)
 
 
 def workspace_postures(leg, count=60_000, seed=1):
@@ -97,11 +97,11 @@ def test_the_default_strokes_cover_the_papers_workspace():
 
 def test_positive_phi_is_backward_and_positive_side_swing_towards_the_body():
     back = LEG.inverse(foot_at(0.2, 0.7))
-    assert back.foot_position[1] < 0.0
+    assert back.foot_position[0] < 0.0
     inward = LEG.inverse(foot_at(0.0, 0.7, 0.2))
-    assert inward.foot_position[0] < 0.0
+    assert inward.foot_position[1] > 0.0
     (pin,) = points_of(LEG.linkage(inward), "K")
-    assert pin[0] < 0.0
+    assert pin[1] > 0.0
 
 
 @legs
@@ -170,8 +170,8 @@ def test_planar_jacobian_is_the_planar_part_of_the_jacobian():
     posture = workspace_postures(LEG)
     jacobian, psi_s = LEG.jacobian(posture), posture.closure[:, 2]
     planar = LEG.planar_jacobian(posture)
-    up = np.stack([np.sin(psi_s), np.zeros_like(psi_s), np.cos(psi_s)], axis=-1)
-    np.testing.assert_array_equal(planar[:, 0], jacobian[:, 1, :2])
+    up = np.stack([np.zeros_like(psi_s), -np.sin(psi_s), np.cos(psi_s)], axis=-1)
+    np.testing.assert_array_equal(planar[:, 0], jacobian[:, 0, :2])
     np.testing.assert_allclose(
         planar[:, 1], np.einsum("ni,nik->nk", up, jacobian[:, :, :2]), atol=1e-12
     )
@@ -184,16 +184,14 @@ def test_cylinder_forces_balance_the_load_joint_by_joint():
     cylinder's force at its crank must balance that of the load at the crank's other end.
     """
     posture = workspace_postures(LEG)
-    posture = LEG.inverse(posture.foot_position * [0, 1, 1])
+    posture = LEG.inverse(posture.foot_position * [1, 0, 1])
     rng = np.random.default_rng(3)
-    load = np.concatenate(
-        [np.zeros((len(posture.status), 1)), rng.normal(size=(len(posture.status), 2))], axis=-1
-    )
+    load = rng.normal(size=(len(posture.status), 3)) * [1, 0, 1]
     efforts = np.einsum("nik,ni->nk", LEG.jacobian(posture), load)
     a, b, c, d, e, f = points_of(LEG.linkage(posture), *"ABCDEF")
 
-    def moment(arm, force):  # about +x
-        return arm[:, 1] * force[:, 2] - arm[:, 2] * force[:, 1]
+    def moment(arm, force):  # about -y
+        return arm[:, 0] * force[:, 2] - arm[:, 2] * force[:, 0]
 
     for pin, anchor, corner, effort in ((a, b, f, efforts[:, 0]), (d, c, e, efforts[:, 1])):
         direction = (pin - anchor) / np.linalg.norm(pin - anchor, axis=-1, keepdims=True)
@@ -205,12 +203,12 @@ def test_cylinder_forces_balance_the_load_joint_by_joint():
 def test_a_side_load_is_carried_by_the_swing_cylinder_alone():
     posture = workspace_postures(LEG)
     psi_s = posture.closure[:, 2]
-    across = np.stack([np.cos(psi_s), np.zeros_like(psi_s), -np.sin(psi_s)], axis=-1)
+    across = np.stack([np.zeros_like(psi_s), np.cos(psi_s), np.sin(psi_s)], axis=-1)
     efforts = np.einsum("nik,ni->nk", LEG.jacobian(posture), across)
     np.testing.assert_allclose(efforts[:, :2], 0.0, atol=1e-12)
     k, pin, i = points_of(LEG.linkage(posture), "K", "L", "I")
     push = efforts[:, 2:] * (pin - k) / np.linalg.norm(pin - k, axis=-1, keepdims=True)
-    np.testing.assert_allclose(np.cross(pin, push)[:, 1], np.cross(i, across)[:, 1], atol=1e-12)
+    np.testing.assert_allclose(np.cross(pin, push)[:, 0], np.cross(i, across)[:, 0], atol=1e-12)
 
 
 @legs
@@ -244,12 +242,12 @@ def test_cranks_and_crossed_bars_are_rigid(leg):
 
 def test_mirrored_leg_is_the_mirror_image():
     points = workspace_postures(LEG).foot_position
-    there, here = LEG.inverse(points), Mirrored(LEG).inverse(points * [-1, 1, 1])
+    there, here = LEG.inverse(points), Mirrored(LEG).inverse(points * [1, -1, 1])
     np.testing.assert_array_equal(here.status, there.status)
     np.testing.assert_array_equal(here.joint_positions, there.joint_positions)
     rates = np.array([0.3, -0.2, 0.5])
     v, v_here = LEG.jacobian(there) @ rates, Mirrored(LEG).jacobian(here) @ rates
-    np.testing.assert_array_equal(v_here, v * [-1, 1, 1])
+    np.testing.assert_array_equal(v_here, v * [1, -1, 1])
 
 
 @pytest.mark.parametrize("mode", LEG.assembly_modes)
@@ -301,7 +299,7 @@ def test_cylinders_have_four_postures_told_apart_by_modes():
         (foot_at(0.0, 1.0401), Status.UNREACHABLE),
         (foot_at(0.0, 1.04), Status.SINGULAR),  # stretched: theta = 0
         ([0.0, 0.0, 0.0], Status.SINGULAR),  # folded flat: theta = 90°
-        ([0.0, 0.5, 0.0], Status.SINGULAR),  # on the axis of the side swing
+        ([0.5, 0.0, 0.0], Status.SINGULAR),  # on the axis of the side swing
         (foot_at(0.0, 0.97), Status.PASSIVE_JOINT_LIMIT),
         (foot_at(0.0, 0.7, 0.5), Status.JOINT_LIMIT),
         ([0.0, 0.0, math.nan], Status.INVALID_INPUT),
@@ -453,6 +451,6 @@ def test_the_shipped_quadruped_has_the_default_leg_four_times():
         assert leg.mirrored == name.startswith("left")
         for field in (f.name for f in fields(DoubleRhombus)):
             np.testing.assert_allclose(getattr(leg.geometry, field), getattr(LEG, field))
-        outward = leg.mount.vectors_to_base([-1.0 if leg.mirrored else 1.0, 0.0, 0.0])
-        assert np.sign(outward[1]) == np.sign(leg.mount.position[1])
-        np.testing.assert_allclose(leg.mount.vectors_to_base([0, 1, 0]), [1, 0, 0], atol=1e-12)
+        (pin,) = points_of(leg.mechanism.linkage(leg.mechanism.initial_posture), "K")
+        inward = leg.mount.vectors_to_base(pin)  # to where the body is
+        assert np.sign(inward[1]) == -np.sign(leg.mount.position[1])

@@ -30,10 +30,10 @@ ODD = GantryHybrid(
     slide_a_start=0.170,
     slide_b_start=0.120,
     slide_c_start=-0.060,
-    rail_c_forward=0.170,
+    rail_c_left=0.170,
     platform_arm=0.130,
-    shaft_base_forward=0.060,
-    shaft_platform_forward=-0.040,
+    shaft_base_left=0.060,
+    shaft_platform_left=-0.040,
     bar_a_length=0.300,
     bar_b_length=0.260,
     rod_c_length=0.310,
@@ -216,7 +216,7 @@ def test_the_default_signs_are_the_printed_ones_of_the_start():
     g = ARM
     s1 = -math.sqrt(g.bar_a_length**2 - z**2) + g.slide_a_start + x - g.platform_half_width
     s3 = math.sqrt(g.bar_b_length**2 - z**2) - g.slide_b_start + x + g.platform_half_width
-    d, e = g.rail_c_forward, g.platform_arm
+    d, e = g.rail_c_left, g.platform_arm
     squared = (e * math.cos(beta) - d) ** 2 + (z + e * math.sin(beta)) ** 2
     s4 = math.sqrt(g.rod_c_length**2 - squared) + x - g.slide_c_start
     posture = ARM.inverse(task)
@@ -463,7 +463,7 @@ def test_singular_positions(task, what):
 def test_a_rod_across_its_rail_is_singular():
     """k = 0: choose z so that C' is just L3 away from the rail."""
     beta = 0.3
-    forward = ARM.platform_arm * math.cos(beta) - ARM.rail_c_forward
+    forward = ARM.platform_arm * math.cos(beta) - ARM.rail_c_left
     rise = math.sqrt(ARM.rod_c_length**2 - forward**2)
     z = rise - ARM.platform_arm * math.sin(beta)
     assert FREE.inverse([0.0, 0.0, z - 1e-6, beta]).status == Status.OK

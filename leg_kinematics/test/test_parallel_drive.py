@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from leg_kinematics import GeometryError, ParallelDrive, ShapeError, Status, UnknownNameError
 from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.mechanisms.walking_axes import walking_vectors
 from leg_kinematics.mirrored import Mirrored
 
 INITIAL = ParallelDrive()
@@ -39,7 +40,8 @@ def test_offers_the_mechanism_protocol():
 def test_initial_pose_has_the_published_coordinates():
     linkage = INITIAL.linkage(INITIAL.initial_posture)
     hip_in_p = np.array([0.0, 0.190, -0.055])
-    points = {n: 1e3 * (p + hip_in_p) for n, p in zip(linkage.names, linkage.points, strict=True)}
+    in_p = 1e3 * (walking_vectors(linkage.points) + hip_in_p)
+    points = dict(zip(linkage.names, in_p, strict=True))
     published = {
         "U1": (138, 161.8, -117.6),
         "U2": (-138, 161.8, -117.6),
@@ -178,18 +180,18 @@ def test_mirrored_leg_is_the_mirror_image():
     mirrored = Mirrored(OPTIMISED)
     points = np.random.default_rng(4).uniform([-0.3, -0.3, -0.8], [0.3, 0.3, -0.4], (5000, 3))
     there = OPTIMISED.inverse(points)
-    here = mirrored.inverse(points * [-1, 1, 1])
+    here = mirrored.inverse(points * [1, -1, 1])
     np.testing.assert_array_equal(here.status, there.status)
     np.testing.assert_array_equal(here.joint_positions, there.joint_positions)
     ok = here.status == Status.OK
     rates = np.array([0.3, -0.2, 0.5])
     v, v_here = OPTIMISED.jacobian(there) @ rates, mirrored.jacobian(here) @ rates
-    np.testing.assert_array_equal(v_here[ok], v[ok] * [-1, 1, 1])
+    np.testing.assert_array_equal(v_here[ok], v[ok] * [1, -1, 1])
 
 
-def test_leg_is_symmetric_about_the_plane_x_0():
+def test_leg_is_symmetric_about_the_plane_y_0():
     points = np.random.default_rng(5).uniform([-0.3, -0.3, -0.9], [0.3, 0.3, -0.5], (5000, 3))
-    left, right = INITIAL.inverse(points), INITIAL.inverse(points * [-1, 1, 1])
+    left, right = INITIAL.inverse(points), INITIAL.inverse(points * [1, -1, 1])
     np.testing.assert_array_equal(left.status, right.status)
     swapped = right.joint_positions[:, [1, 0, 2]]
     np.testing.assert_allclose(left.joint_positions, swapped, atol=1e-12)
@@ -231,7 +233,7 @@ def test_forward_undoes_inverse_in_every_assembly_mode(mode):
     free = ParallelDrive(
         joint_ranges=((-np.pi, np.pi),) * 3, passive_joint_ranges=((-np.pi, np.pi),) * 9
     )
-    points = np.random.default_rng(7).uniform([-0.2, -0.6, -1.2], [0.2, 0.6, -0.2], (4000, 3))
+    points = np.random.default_rng(7).uniform([-0.6, -0.2, -1.2], [0.6, 0.2, -0.2], (4000, 3))
     inverse = free.inverse(points, mode)
     ok = inverse.status == Status.OK
     assert ok.sum() > 300

@@ -51,7 +51,7 @@ def test_foot_agrees_with_equation_5_as_printed():
     for angle in np.linspace(0.0, 6.0, 13):
         x, y = foot_by_equation_5(LEG, angle)
         foot = LEG.forward([angle]).foot_position
-        np.testing.assert_allclose(foot, [0.0, -x, y], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(foot, [-x, 0.0, y], rtol=0, atol=1e-12)
 
 
 def test_default_is_the_optimum_at_168_degrees():

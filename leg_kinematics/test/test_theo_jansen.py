@@ -25,7 +25,7 @@ def simulated_feet():
     start = dict(zip(LEG.point_names, LEG.linkage(LEG.forward([0.0])).points, strict=True))
 
     def at(name):
-        return {"x": -start[name][1], "y": start[name][2], "name": name}
+        return {"x": -start[name][0], "y": start[name][2], "name": name}
 
     a, d = pl.Ground(0.0, 0.0, name="A"), pl.Ground(38 / 15, -7.8 / 15, name="D")
     crank = pl.Crank(anchor=a, radius=1.0, angular_velocity=2 * math.pi / STEPS, name="B")
@@ -47,7 +47,7 @@ def test_foot_agrees_with_pylinkage():
     simulated = simulated_feet()
     q = np.arange(1, STEPS + 1)[:, None] * (2 * math.pi / STEPS)
     foot = LEG.forward(q).foot_position
-    np.testing.assert_allclose(simulated[:, 0], -foot[:, 1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(simulated[:, 0], -foot[:, 0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(simulated[:, 1], foot[:, 2], rtol=0, atol=1e-9)
 
 
@@ -59,7 +59,7 @@ def test_gait_of_jansen():
 
 def test_the_leg_walks_forwards_when_the_crank_does():
     curve = gait_curve(LEG)
-    assert (np.diff(curve.support[:, 1]) < 0.0).all()
+    assert (np.diff(curve.support[:, 0]) < 0.0).all()
     assert (np.diff(curve.body_path[:, 0]) > 0.0).all()
 
 

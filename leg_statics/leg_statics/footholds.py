@@ -111,7 +111,7 @@ class Footholds(NamedTuple):
 
     @property
     def rated_friction(self) -> FloatArray:
-        """mu_e = |F_y / F_z|, equation (22)."""
+        """mu_e = |F_x / F_z|, forward over vertical, equation (22)."""
         return self._columns(MU_E)
 
     @property
@@ -296,7 +296,7 @@ def rate_friction(block, i):
             (columns[0][2], columns[1][2], columns[2][2]),
         )
     )
-    block[MU_E, i] = abs(y_slope)
+    block[MU_E, i] = abs(x_slope)
     block[MU_FULL, i] = math.sqrt(x_slope * x_slope + y_slope * y_slope)
 
 

@@ -34,14 +34,14 @@ def force_slopes(jacobian: Sequence[Sequence[float]]) -> tuple[float, float]:
     q_z / zz, and the slopes are quotients in L.
     """
     xx, yx, yy, zx, zy, _ = row_factors(jacobian)
-    return (yx * zy - zx * yy) / (xx * yy), zy / yy
+    return (yx * zy - zx * yy) / (xx * yy), -zy / yy
 
 
 @kernel("(n,n)->(),(),()", "f8[:,:], f8[:], f8[:], f8[:]")
 def _unit_effort_force(jacobian, capacity, friction, full_friction):
     capacity[0] = 1.0 / row_factors(jacobian)[5]
     x_slope, y_slope = force_slopes(jacobian)
-    friction[0] = abs(y_slope)
+    friction[0] = abs(x_slope)
     full_friction[0] = math.hypot(x_slope, y_slope)
 
 
@@ -64,9 +64,10 @@ def unit_effort_capacity(jacobian: Any) -> FloatArray:
 
 
 def rated_friction(jacobian: Any) -> FloatArray:
-    """mu_e = |F_y / F_z| of the force that attains eta_cF (...,), equation (22).
+    """mu_e = |F_x / F_z| of the force that attains eta_cF (...,), equation (22).
 
-    Only the component along the walking direction y counts, as in the paper.
+    Only the component along the walking direction counts, as in the paper: x, which is its y.
+    `rated_friction_full` takes both.
     """
     return _unit_effort_force(_spatial(jacobian, "rated_friction"))[1]
 
@@ -209,7 +210,7 @@ INDICES: dict[str, Index] = {
             "1",
             "paper 000 (22)",
             "low",
-            "Friction |F_y / F_z| that the ground must offer to bear that force.",
+            "Friction |F_x / F_z| (forward / vertical) that the ground must offer for that force.",
             lambda k: rated_friction(k.jacobian),
             is_spatial_leg,
         ),
@@ -219,7 +220,7 @@ INDICES: dict[str, Index] = {
             "1",
             "paper 000 (22), both horizontal components",
             "low",
-            "Friction sqrt(F_x² + F_y²) / F_z that the ground must offer to bear that force.",
+            "Friction sqrt(F_x² + F_y²) / F_z that the ground must offer for that force.",
             lambda k: rated_friction_full(k.jacobian),
             is_spatial_leg,
         ),

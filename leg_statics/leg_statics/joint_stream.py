@@ -152,7 +152,7 @@ def _merged(parts: Sequence[LegStates], layout: JointLayout, batch: tuple[int, .
         (),
         np.empty((*batch, 0), np.uint8),
         *np.empty((2, *batch, 0, 3)),
-        *np.empty((4, *batch, 0)),
+        *np.empty((5, *batch, 0)),
     )
     joints = [positions for part in parts for positions in part.joint_positions]
     arrays = (

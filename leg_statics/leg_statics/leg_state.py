@@ -34,7 +34,9 @@ class LegStates(NamedTuple):
         condition_number: Condition number of the Jacobian (..., L); NaN where status is not OK, or
             if the Jacobian is not square.
         load_capacity: Greatest vertical ground reaction (..., L) [N]; NaN where status is not OK.
-        rated_friction: mu_e (..., L); NaN as the condition number.
+        rated_friction: mu_e = |F_x / F_z|, forward over vertical (..., L); NaN as the condition
+            number.
+        rated_friction_full: sqrt(F_x² + F_y²) / F_z of the same force (..., L).
         utilisation: Largest effort / effort limit (..., L); NaN if the efforts are not known.
     """
 
@@ -46,6 +48,7 @@ class LegStates(NamedTuple):
     condition_number: FloatArray
     load_capacity: FloatArray
     rated_friction: FloatArray
+    rated_friction_full: FloatArray
     utilisation: FloatArray
 
 
@@ -68,7 +71,7 @@ def leg_states(
     posture, twist = group.mechanism.forward_with_twist(joint_positions)
     jacobian = twist[..., :3, :]
     borne = load_capacity(jacobian, group.lower, group.upper, friction)  # the leg has no weight
-    velocity, condition, mu_e, used = _leg_states(
+    velocity, condition, mu_e, mu_full, used = _leg_states(
         jacobian, posture.status, group.lower, group.upper, joint_velocities, joint_efforts
     )
     return LegStates(
@@ -80,22 +83,26 @@ def leg_states(
         condition_number=condition,
         load_capacity=np.where(posture.status == Status.OK, borne.capacity, np.nan),
         rated_friction=mu_e,
+        rated_friction_full=mu_full,
         utilisation=used,
     )
 
 
 @kernel(
-    "(d,n),(),(n),(n),(n),(n)->(d),(),(),()",
-    "f8[:,:], u1, f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]",
+    "(d,n),(),(n),(n),(n),(n)->(d),(),(),(),()",
+    "f8[:,:], u1, f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]",
 )
-def _leg_states(jacobian, status, lower, upper, rates, efforts, velocity, condition, mu_e, used):
+def _leg_states(
+    jacobian, status, lower, upper, rates, efforts, velocity, condition, mu_e, mu_full, used
+):
     """One leg without reflection; what is reflected is its velocity only."""
     for i in range(3):
         velocity[i] = 0.0
         for k in range(len(rates)):
             velocity[i] += jacobian[i, k] * rates[k]
     used[0], _ = utilisation_of_point(efforts, lower, upper)
-    condition[0], mu_e[0] = math.nan, math.nan
+    condition[0], mu_e[0], mu_full[0] = math.nan, math.nan, math.nan
     if status == OK and len(rates) == 3:
         condition[0] = condition_of_point(jacobian)
-        mu_e[0] = abs(force_slopes(jacobian)[1])
+        x_slope, y_slope = force_slopes(jacobian)
+        mu_e[0], mu_full[0] = abs(x_slope), math.hypot(x_slope, y_slope)

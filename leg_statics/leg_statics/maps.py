@@ -141,7 +141,7 @@ def plane_map(
 
 def line_map(
     mechanism: Mechanism,
-    x: float,
+    y: float,
     height: float,
     resolution: float,
     *,
@@ -149,11 +149,11 @@ def line_map(
     effort_limits: ArrayLike | None = None,
     contact: Contact | None = None,
 ) -> IndexMap:
-    """Map the layers along the line at x and z = height, which runs in the walking direction.
+    """Map the layers along the line at y and z = height, which runs in the walking direction.
 
     Args:
         mechanism: The leg's mechanism.
-        x: x of the line in the leg frame [m].
+        y: y of the line in the leg frame [m].
         height: z of the line in the leg frame [m].
         resolution: Grid spacing [m].
         layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
@@ -164,13 +164,13 @@ def line_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If place or resolution are out of range.
     """
-    if not np.isfinite([x, height]).all():
-        raise ValueRangeError(f"x and height must be finite, got {x} and {height}")
+    if not np.isfinite([y, height]).all():
+        raise ValueRangeError(f"y and height must be finite, got {y} and {height}")
     names = _layers(mechanism, layers, effort_limits, contact)
-    line = np.array([float(x)])
-    _, y = _axes(mechanism, resolution, 2)
-    values, status = _slice(mechanism, line, y, float(height), names, effort_limits, contact)
-    return IndexMap(line, y, np.array([height]), names, values[None], status[None])
+    line = np.array([float(y)])
+    x, _ = _axes(mechanism, resolution, 2)
+    values, status = _slice(mechanism, x, line, float(height), names, effort_limits, contact)
+    return IndexMap(x, line, np.array([height]), names, values[None], status[None])
 
 
 def volume_map(

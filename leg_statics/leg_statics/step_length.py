@@ -25,6 +25,7 @@ from leg_statics.workspace import actuator_grid
 END_TOLERANCE = 1e-6  # m, to which the ends of a stance are found
 SAMPLING = 2e-3  # m, a feasible stretch shorter than this may be overlooked
 PROFILE_POINTS = 21
+FORWARD = (1.0, 0.0, 0.0)  # of a leg and of the body: both frames follow REP-103
 LONGEST_LINE = 20_000  # samples of one line
 
 
@@ -33,7 +34,7 @@ class Criterion(IntEnum):
 
     Attributes:
         CAPACITY: The load capacity within the friction cone is at least the required load.
-        RATED_FRICTION: The paper's: the ground's friction is at least mu_e = |F_y / F_z|, (22).
+        RATED_FRICTION: The paper's: the ground's friction is at least mu_e = |F_x / F_z|, (22).
     """
 
     CAPACITY = 0
@@ -52,6 +53,7 @@ class StepLength(NamedTuple):
         positions: Points along the stance (..., 21, 3) [m].
         load_capacity: Load capacity at these points (..., 21) [N].
         rated_friction: mu_e at these points (..., 21).
+        rated_friction_full: Its full form at these points (..., 21).
     """
 
     length: FloatArray
@@ -62,6 +64,7 @@ class StepLength(NamedTuple):
     positions: FloatArray
     load_capacity: FloatArray
     rated_friction: FloatArray
+    rated_friction_full: FloatArray
 
 
 def longest_step(
@@ -71,13 +74,13 @@ def longest_step(
     contact: Contact,
     *,
     lateral_offset: ArrayLike = 0.0,
-    direction: ArrayLike = (0.0, 1.0, 0.0),
+    direction: ArrayLike = FORWARD,
     criterion: Criterion = Criterion.CAPACITY,
 ) -> StepLength:
     """Find the longest straight stance on which every point is feasible.
 
     The line runs along `direction` at the given height; it passes the origin of the leg frame at
-    the lateral offset, which counts to the right of the direction (x for the default direction).
+    the lateral offset, which counts to the left of the direction (y for the default direction).
 
     Args:
         mechanism: The leg's mechanism.
@@ -99,8 +102,8 @@ def longest_step(
     heights, offsets = np.broadcast_arrays(
         _finite("height", height), _finite("lateral_offset", lateral_offset)
     )
-    right = np.array([along[1], -along[0], 0.0])
-    origin = offsets[..., None] * right + heights[..., None] * np.array([0.0, 0.0, 1.0])
+    left = np.array([-along[1], along[0], 0.0])
+    origin = offsets[..., None] * left + heights[..., None] * np.array([0.0, 0.0, 1.0])
 
     def evaluate(s: FloatArray) -> tuple[NDArray[np.uint8], Footholds]:
         """Return verdict and footholds at distances s (..., m) along the lines."""
@@ -139,6 +142,7 @@ def longest_step(
         positions=footholds.posture.foot_position,
         load_capacity=footholds.load_capacity,
         rated_friction=footholds.rated_friction,
+        rated_friction_full=footholds.rated_friction_full,
     )
 
 
@@ -162,7 +166,7 @@ def common_step(
     contact: Contact,
     *,
     lateral_offset: Callable[[Leg], float] | float = 0.0,
-    direction: ArrayLike = (1.0, 0.0, 0.0),
+    direction: ArrayLike = FORWARD,
     criterion: Criterion = Criterion.CAPACITY,
 ) -> CommonStep:
     """Find the step that all given legs can make at once.

@@ -24,12 +24,12 @@ def test_a_friction_curve_runs_where_the_line_is_inside_the_workspace():
     line = line_map(LEG, 0.05, -0.7, 0.01, layers=LAYER)
     ax = plot_rated_friction({"leg": line}, []).axes[0]
     (curve,) = (shown for shown in ax.lines if "$h$" in str(shown.get_label()))
-    values = line.layer("rated_friction")[0, :, 0]
+    values = line.layer("rated_friction")[0, 0]
     inside = np.isfinite(values)
-    np.testing.assert_array_equal(curve.get_xdata(), line.y[inside])
+    np.testing.assert_array_equal(curve.get_xdata(), line.x[inside])
     np.testing.assert_array_equal(curve.get_ydata(), values[inside])
     assert curve.get_label() == "leg, $h$ = −0.70 m"
-    assert ax.get_xlabel() == "$y$ [m], at $x$ = 0.05 m"
+    assert ax.get_xlabel() == "$x$ [m], forward, at $y$ = 0.05 m"
 
 
 def test_every_ground_is_named_and_spans_its_friction():
@@ -45,7 +45,7 @@ def test_every_ground_is_named_and_spans_its_friction():
 def test_what_is_not_one_line_in_the_workspace_is_refused():
     with pytest.raises(ShapeError, match="must be one line"):
         plot_rated_friction({"leg": plane_map(LEG, -0.7, 0.05, layers=LAYER)}, PAPER_GROUNDS)
-    with pytest.raises(ValueRangeError, match="no point of the workspace at x = 0 m, height -3 m"):
+    with pytest.raises(ValueRangeError, match="no point of the workspace at y = 0 m, height -3 m"):
         plot_rated_friction({"leg": line_map(LEG, 0.0, -3.0, 0.05, layers=LAYER)}, PAPER_GROUNDS)
     with pytest.raises(ValueRangeError, match="no curve"):
         plot_rated_friction({}, PAPER_GROUNDS)

@@ -14,13 +14,13 @@ from leg_statics.workspace import vertical_section
 LEG = ParallelDrive()
 POSTURE = LEG.initial_posture
 LINKAGE, FOOT = LEG.linkage(POSTURE), POSTURE.foot_position
-SIDE, FRONT = (View(vertical_section(LEG, FOOT, axis)) for axis in (1, 0))
+SIDE, FRONT = (View(vertical_section(LEG, FOOT, axis)) for axis in (0, 1))
 SQUARE = np.array([[-100.0, 0.0], [100.0, 0.0], [100.0, 400.0], [-100.0, 400.0]])
 
 
 def test_the_linkage_is_drawn_in_both_views():
     side, front = panels(plot_linkage(LINKAGE, FOOT, SIDE, FRONT))
-    for ax, plane in ((side, [1, 2]), (front, [0, 2])):
+    for ax, plane in ((side, [0, 2]), (front, [1, 2])):
         joints = ax.lines[-1]
         np.testing.assert_allclose(np.transpose(joints.get_data()), LINKAGE.points[:, plane])
         assert ax.get_aspect() == 1.0
@@ -33,7 +33,7 @@ def test_forces_stand_at_the_foot_in_one_scale_that_is_told():
     (scale,) = {
         float(text.split("= ")[1].split(" N")[0]) for text in texts(figure) if "0.1 m =" in text
     }
-    shares = zip(panels(figure), ([1, 2], [0, 2]), (1.0, 0.5), strict=True)
+    shares = zip(panels(figure), ([0, 2], [1, 2]), (1.0, 0.5), strict=True)
     for ax, plane, share in shares:
         corners = next(p.get_xy()[:4] for p in ax.patches if len(p.get_xy()) == 5)
         np.testing.assert_allclose((corners - FOOT[plane]) * scale / 0.1, share * SQUARE)
@@ -41,7 +41,7 @@ def test_forces_stand_at_the_foot_in_one_scale_that_is_told():
 
 def test_the_friction_cone_has_the_slope_of_its_coefficient():
     figure = plot_linkage(LINKAGE, FOOT, SIDE, FRONT, 0.4)
-    for ax, plane in zip(panels(figure), ([1, 2], [0, 2]), strict=True):
+    for ax, plane in zip(panels(figure), ([0, 2], [1, 2]), strict=True):
         (cone,) = (line for line in ax.lines if "friction cone" in str(line.get_label()))
         left, tip, right = np.transpose(cone.get_data())
         np.testing.assert_allclose(tip, FOOT[plane])

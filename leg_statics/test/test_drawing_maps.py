@@ -44,8 +44,8 @@ def test_a_map_is_labelled_by_the_registry(index):
     assert f"[{INDICES[index].unit.replace('N.m', 'N·m')}]" in label
     assert any(label in text for text in texts(figure))
     (ax,) = panels(figure)
-    assert ax.get_xlabel() == "$x$ [m]"
-    assert ax.get_ylabel() == "$y$ [m]"
+    assert ax.get_xlabel() == "$y$ [m], left"
+    assert ax.get_ylabel() == "$x$ [m], forward"
 
 
 def test_symbols_are_typeset():
@@ -62,12 +62,13 @@ def test_a_map_has_one_panel_a_height_and_one_colour_scale(index_figure):
     first, second = meshes(index_figure)
     assert first.norm is second.norm
     assert all(ax.get_aspect() == 1.0 for ax in panels(index_figure))
+    assert all(ax.xaxis_inverted() and not ax.yaxis_inverted() for ax in panels(index_figure))
     assert sum(ax.get_label() == "<colorbar>" for ax in index_figure.axes) == 1
 
 
 def test_a_map_is_blank_outside_the_workspace_and_shows_the_values_inside(index_figure):
     for mesh, height in zip(meshes(index_figure), HEIGHTS, strict=True):
-        truth = plane_map(LEG, height, RESOLUTION, layers=["condition_number"]).values[0, ..., 0]
+        truth = plane_map(LEG, height, RESOLUTION, layers=["condition_number"]).values[0, ..., 0].T
         shown = np.ma.masked_invalid(mesh.get_array())
         assert np.array_equal(np.ma.getmaskarray(shown), np.isnan(truth))
         assert 0 < shown.count() < shown.size

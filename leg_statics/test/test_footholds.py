@@ -18,7 +18,7 @@ from leg_statics.published.paper_000 import legs
 
 LEG = legs()["optimised"]
 LIMITS = np.array([[-60.0, 60.0], [-60.0, 60.0], [-80.0, 40.0]])
-CANDIDATES = np.random.default_rng(0).uniform([-0.3, -0.4, -0.8], [0.3, 0.3, -0.4], (4000, 3))
+CANDIDATES = np.random.default_rng(0).uniform([-0.4, -0.3, -0.8], [0.3, 0.3, -0.4], (4000, 3))
 NORMAL = np.array([0.1, -0.2, 1.0])
 BIAS = np.array([4.0, -3.0, 6.0])
 MOMENT = np.array([3.0, -2.0, 1.0])
@@ -168,12 +168,12 @@ def test_friction_margin_is_what_the_ground_offers_beyond_mu_e():
 
 def test_a_mirrored_leg_mirrors_everything():
     contact = CONTACTS["inclined"]
-    mirror = contact._replace(normal=NORMAL * [-1, 1, 1])
+    mirror = contact._replace(normal=NORMAL * [1, -1, 1])
     a = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
-    b = evaluate_footholds(Mirrored(LEG), LIMITS, CANDIDATES * [-1, 1, 1], mirror)
+    b = evaluate_footholds(Mirrored(LEG), LIMITS, CANDIDATES * [1, -1, 1], mirror)
     np.testing.assert_array_equal(a.verdict, b.verdict)
     np.testing.assert_allclose(a.load_capacity, b.load_capacity, rtol=1e-9)
-    np.testing.assert_allclose(a.force * [-1, 1, 1], b.force, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(a.force * [1, -1, 1], b.force, rtol=1e-6, atol=1e-6)
 
 
 def test_contacts_may_differ_from_candidate_to_candidate():

@@ -79,7 +79,7 @@ def test_rated_friction_is_the_slope_of_the_force_that_attains_eta_cf(postures):
     force = np.einsum("nij,nj->ni", g, vectors[..., -1])
     np.testing.assert_allclose(indices.unit_effort_capacity(j), np.sqrt(values[:, -1]), rtol=1e-10)
     np.testing.assert_allclose(
-        indices.rated_friction(j), np.abs(force[:, 1] / force[:, 2]), rtol=1e-8, atol=1e-10
+        indices.rated_friction(j), np.abs(force[:, 0] / force[:, 2]), rtol=1e-8, atol=1e-10
     )
     np.testing.assert_allclose(
         indices.rated_friction_full(j),
@@ -100,10 +100,10 @@ def test_constraint_wrenches_do_no_work_on_motions_of_the_platform(postures):
     linkage = LEG.linkage(postures)
     point = {n: linkage.points[:, i] for i, n in enumerate(linkage.names)}
     a = postures.closure[:, 0]
-    x_axis = np.broadcast_to([1.0, 0.0, 0.0], point["G"].shape)
-    across = np.stack([0 * a, np.sin(a), -np.cos(a)], axis=-1)  # second axis of U3
+    y_axis = np.broadcast_to([0.0, 1.0, 0.0], point["G"].shape)
+    across = np.stack([np.sin(a), 0 * a, -np.cos(a)], axis=-1)  # second axis of U3
     jc = LEG.constraint_jacobian(postures)
-    for axis, through in ((x_axis, "R_D3"), (x_axis, "U3"), (across, "U3")):
+    for axis, through in ((y_axis, "R_D3"), (y_axis, "U3"), (across, "U3")):
         velocity = np.cross(axis, point["G"] - point[through])
         twist = np.concatenate([velocity, axis], axis=-1)
         power = np.einsum("nij,nj->ni", jc, twist)
@@ -137,7 +137,7 @@ def test_a_mirrored_leg_has_the_same_indices(postures):
     mirrored = Mirrored(LEG)
     foot = postures.foot_position
     _, values = evaluate_indices(LEG, LEG.inverse(foot))
-    _, mirror = evaluate_indices(mirrored, mirrored.inverse(foot * [-1, 1, 1]))
+    _, mirror = evaluate_indices(mirrored, mirrored.inverse(foot * [1, -1, 1]))
     np.testing.assert_allclose(mirror, values, rtol=1e-9)
 
 

@@ -58,7 +58,7 @@ def test_states_equal_the_separate_functions_of_the_library(name):
         )
         used, _ = utilisation(efforts, leg.effort_limits)
         np.testing.assert_allclose(states.utilisation[:, k], used, **SAME)
-        for index in ("condition_number", "rated_friction"):
+        for index in ("condition_number", "rated_friction", "rated_friction_full"):
             wanted = np.full(len(q), np.nan)
             if index in supported_indices(leg.mechanism):
                 wanted = evaluate_indices(leg.mechanism, posture, [index])[1][:, 0]

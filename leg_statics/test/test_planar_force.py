@@ -16,7 +16,7 @@ from leg_statics.planar_force import force_transmission
 def planar_jacobian(phi, radius):
     """G_V of the default leg at swing phi [rad] and OI = radius [m]."""
     leg = DoubleRhombus()
-    feet = np.stack([0.0 * phi, -radius * np.sin(phi), -radius * np.cos(phi)], axis=-1)
+    feet = np.stack([-radius * np.sin(phi), 0.0 * phi, -radius * np.cos(phi)], axis=-1)
     return leg.planar_jacobian(leg.inverse(feet))
 
 

@@ -40,7 +40,7 @@ def phi_of(design, angles):
     mechanism = design.mechanism()
     posture = mechanism.forward(angles[:, None], design.assembly_mode)
     linkage = mechanism.linkage(posture)
-    points = -linkage.points[..., 1] + 1j * linkage.points[..., 2]
+    points = -linkage.points[..., 0] + 1j * linkage.points[..., 2]
     b, c, f = (points[:, linkage.names.index(n)] for n in "BCF")
     return np.angle((b - c) / (f - c)) % (2 * math.pi)
 
@@ -112,7 +112,7 @@ def test_angle_deviation_is_that_of_the_foot_bar():
     angles = np.arange(8) * (math.pi / 4)
     points = jansen_points(angles)
     foot = OPTIMUM.mechanism().forward(angles[:, None]).foot_position
-    bar = -foot[:, 1] + 1j * foot[:, 2] - points["C"]
+    bar = -foot[:, 0] + 1j * foot[:, 2] - points["C"]
     turned = (points["G"] - points["C"]) * np.exp(1j * deviation)
     np.testing.assert_allclose(turned, bar, atol=1e-9)
 
@@ -183,7 +183,7 @@ def test_flipped_designs_are_assembled_in_their_mode():
     assert design.assembly_mode == "flipped_crank+foot"
     foot = design.mechanism().forward([0.7], design.assembly_mode).foot_position
     jansen = jansen_points([0.7])
-    distance = np.linalg.norm(foot - [0.0, -jansen["G"][0].real, jansen["G"][0].imag])
+    distance = np.linalg.norm(foot - [-jansen["G"][0].real, 0.0, jansen["G"][0].imag])
     assert distance == pytest.approx(foot_deviations(design, np.array([0.7]))[0], abs=1e-12)
     assert distance < fit(design, 3600).largest_deviation + 1e-9
 

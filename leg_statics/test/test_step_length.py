@@ -19,9 +19,9 @@ GROUNDS = load_grounds().by_name
 
 def brute_force(direction, height, offset, contact, spacing=1e-4):
     """Longest run of feasible points of a fine sampling."""
-    right = np.array([direction[1], -direction[0], 0.0])
+    left = np.array([-direction[1], direction[0], 0.0])
     s = np.arange(-1.0, 1.0, spacing)
-    points = offset * right + np.array([0, 0, height]) + s[:, None] * np.asarray(direction)
+    points = offset * left + np.array([0, 0, height]) + s[:, None] * np.asarray(direction)
     feasible = evaluate_footholds(LEG, LIMITS, points, contact).feasible
     edges = np.flatnonzero(np.diff(np.concatenate([[0], feasible.astype(int), [0]])))
     starts, ends = edges[::2], edges[1::2]
@@ -54,7 +54,7 @@ def test_the_ends_are_feasible_and_a_tenth_of_a_millimetre_further_they_are_not(
     step = longest_step(LEG, LIMITS, heights, contact)
     found = step.length > 0.0
     assert found.sum() > 5
-    ahead = np.array([0.0, 1e-4, 0.0])
+    ahead = np.array([1e-4, 0.0, 0.0])
     for ends, outward, limits in (
         (step.start, -ahead, step.start_limit),
         (step.end, ahead, step.end_limit),
@@ -72,7 +72,7 @@ def test_every_point_of_the_profile_carries_the_load():
     assert np.all(step.load_capacity >= 180.0)
     np.testing.assert_allclose(step.positions[:, 0], step.start)
     np.testing.assert_allclose(step.positions[:, -1], step.end)
-    np.testing.assert_allclose(step.end - step.start, step.length[:, None] * [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(step.end - step.start, step.length[:, None] * [1, 0, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("stage", LEGS)
@@ -123,7 +123,7 @@ def test_heights_are_a_batch():
 def test_walking_backwards_swaps_the_ends():
     contact = Contact(0.3, load=150.0)
     there = longest_step(LEG, LIMITS, -0.6, contact)
-    back = longest_step(LEG, LIMITS, -0.6, contact, direction=(0.0, -2.0, 0.0))
+    back = longest_step(LEG, LIMITS, -0.6, contact, direction=(-2.0, 0.0, 0.0))
     np.testing.assert_allclose(there.start, back.end, atol=3e-6)
     assert there.length == pytest.approx(back.length, abs=5e-6)
 
@@ -136,7 +136,7 @@ def test_the_common_step_is_the_shortest():
     lengths = np.array([step.length for step in common.steps.values()])
     assert list(common.steps) == list(robot.legs)
     np.testing.assert_array_equal(common.length, lengths.min(axis=0))
-    # lateral offset counts to the right of the direction: inward for a leg, outward for its mirror
+    # lateral offset counts to the left of the direction: inward for a leg, outward for its mirror
     left, right = common.steps["left_front"], common.steps["right_front"]
     mirror = common_step(
         robot.legs,

@@ -47,12 +47,12 @@ def included_angle(first: float, second: float, opposite: float) -> float:
 
 
 @scalar
-def swing_plane(x: float, z: float) -> tuple[float, float]:
-    """Return the swing about y and zeta < 0 that put (zeta sin swing, y, zeta cos swing) at x, z.
+def swing_plane(across: float, z: float) -> tuple[float, float]:
+    """Return the swing and zeta < 0 that put (zeta sin swing, zeta cos swing) at (across, z).
 
     This is the coordinate pair of legs whose planar mechanism swings sideways as a whole.
     """
-    return math.atan2(-x, -z), -math.hypot(x, z)
+    return math.atan2(-across, -z), -math.hypot(across, z)
 
 
 @inlined

@@ -2,8 +2,8 @@
 
 The linkage is computed in its own plane and in crank lengths: crank axis A at the origin, X and Y
 as papers draw them (Y up, the foot below), the crank turning counter-clockwise. The leg frame has
-its origin at A too, with y = -X and z = Y, because a foot on the ground then moves towards -y when
-the crank turns forwards: the leg walks along +y. The crank's axis is -x of the leg frame.
+its origin at A too, with x = -X and z = Y, because a foot on the ground then moves towards -x when
+the crank turns forwards: the leg walks along +x. The crank's axis is +y of the leg frame.
 
 A mechanism adds its geometry and a handful of kernels, which all get its geometry and its `sides`:
 numbers whose signs tell the assembly (see `dyads`). A posture's closure is such numbers, the
@@ -102,7 +102,7 @@ def side(number: float) -> float:
 @inlined
 def in_leg_frame(crank: float, x: float, y: float) -> tuple[float, float, float]:
     """Return a vector of the linkage's plane, in crank lengths, in the leg frame."""
-    return 0.0, -crank * x, crank * y
+    return -crank * x, 0.0, crank * y
 
 
 @inlined
@@ -430,23 +430,23 @@ class CrankLinkage(Dimensioned):
         foot = as_array("foot_position", foot_position, 3)
         mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):  # infinitely far is far enough
-            x, y = -foot[..., 1] / self.crank_length, foot[..., 2] / self.crank_length
+            x, y = -foot[..., 0] / self.crank_length, foot[..., 2] / self.crank_length
         lower, upper = _near_brackets(self._curves[mode], x, y, np.zeros(MAX_PASSES))
         angles, distances = self.kernels.nearest(
             self._constants, self.sides[mode], x[..., None], y[..., None], lower, upper
         )
-        distances = np.hypot(distances * self.crank_length, foot[..., :1])
+        distances = np.hypot(distances * self.crank_length, foot[..., 1:2])
         order = np.argsort(distances, axis=-1, kind="stable")  # NaN last
         angles = self._in_range(angles - self.crank_zero)
         return Passes(
             np.take_along_axis(angles, order, -1), np.take_along_axis(distances, order, -1)
         )
 
-    def crank_angles_at(self, y: ArrayLike, assembly_mode: str = "") -> FloatArray:
-        """Return all crank angles at which the foot has a given y (..., k) [rad].
+    def crank_angles_at(self, x: ArrayLike, assembly_mode: str = "") -> FloatArray:
+        """Return all crank angles at which the foot has a given x (..., k) [rad].
 
         Args:
-            y: Coordinates along the walking direction (...) [m].
+            x: Coordinates along the walking direction (...) [m].
             assembly_mode: One of `assembly_modes`; "" is "walking".
 
         Returns:
@@ -455,13 +455,13 @@ class CrankLinkage(Dimensioned):
         """
         mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):
-            x = -as_array("y", y)[..., None] / self.crank_length
+            in_plane = -as_array("x", x)[..., None] / self.crank_length
         lower, upper, start, end = self._strokes[mode]
-        inside = (np.minimum(start, end) <= x) & (x <= np.maximum(start, end))
+        inside = (np.minimum(start, end) <= in_plane) & (in_plane <= np.maximum(start, end))
         angles = self.kernels.crossing(
             self._constants,
             self.sides[mode],
-            x,
+            in_plane,
             np.where(inside, lower, np.nan),
             np.where(inside, upper, np.nan),
             np.sign(end - start),
@@ -613,9 +613,9 @@ class CrankLinkage(Dimensioned):
         pivot = points[..., [index(p.point) for p in self.pivots], :]
         first = points[..., [index(p.first) for p in self.pivots], :] - pivot
         second = points[..., [index(p.second) for p in self.pivots], :] - pivot
-        # cross and dot in the linkage's plane, whose X is -y
-        cross = first[..., 2] * second[..., 1] - first[..., 1] * second[..., 2]
-        dot = first[..., 1] * second[..., 1] + first[..., 2] * second[..., 2]
+        # cross and dot in the linkage's plane, whose X is -x
+        cross = first[..., 2] * second[..., 0] - first[..., 0] * second[..., 2]
+        dot = first[..., 0] * second[..., 0] + first[..., 2] * second[..., 2]
         return np.arctan2(cross, dot)
 
     def linkage(self, posture: Posture) -> Linkage:

@@ -4,9 +4,8 @@ Two cylinders turn the two cranks of a planar five-bar at the hip O; the double 
 below it magnifies their motion to the foot I. A third cylinder (RPR) swings the whole planar
 mechanism sideways.
 
-Symbols of the code are the paper's. The paper's plane has X along OC and Z up; angles count from X
-towards Z. Here X is the leg's y, the walking direction, so these angles turn about +x and the leg
-frame stays right-handed: leg (x, y, z) = paper (-Y, X, Z). Its origin is O. With
+Symbols and axes of the code are the paper's. Its plane has X along OC, the walking direction, and
+Z up; angles count from X towards Z, about -Y. The leg frame is the paper's, with origin O. With
 `u(t) = (cos t, sin t)` in the plane:
 
     phi = 3 pi/2 - (beta + theta),  theta = (alpha - beta) / 2    swing of OI, half angle EOF, (1)
@@ -15,11 +14,11 @@ frame stays right-handed: leg (x, y, z) = paper (-Y, X, Z). Its origin is O. Wit
     C = (l6, 0),  B = C + l3 (-cos OCB, sin OCB)                  cylinder pins of the swung frame
     l2 = |AB|,  l4 = |CD|                                         upper, lower cylinder, (3), (4)
     (I_x, I_z) = -4 l cos(theta) (sin phi, cos phi)               foot in the plane, (5)
-    I = (I_z sin psi_s, I_x, I_z cos psi_s)                       foot in the leg frame
+    I = (I_x, -I_z sin psi_s, I_z cos psi_s)                      foot in the leg frame
     q3² = r_b² + r_l² - 2 r_b r_l cos(psi_s + delta)              side swing cylinder
 
-Positive phi puts the foot backward (-y), positive psi_s (about +y) towards -x. EGH and FGJ are
-straight bars: they make the lower rhombus follow the upper one.
+Positive phi puts the foot backward (-x), positive psi_s (about +x) to the left (+y). EGH and FGJ
+are straight bars: they make the lower rhombus follow the upper one.
 
 Corrections of the printed equations: with these angles (12) and (13) have no minus sign,
 J_alphabeta of (14) is diagonal (as printed it swaps the cylinders), and "omega_2" above (12) is
@@ -54,7 +53,7 @@ OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map
 
 PASSIVE_COUNT = 10
 DEAD_CENTRE = 1e-9  # least lever of a cylinder in the initial posture, relative to its crank
-SWING_BODY_PIN = -0.5 * math.pi  # direction O -> K from +z about +y: K lies on the -x side
+SWING_BODY_PIN = -0.5 * math.pi  # direction O -> K from +z about +x: K lies on the left (+y)
 
 
 class Geometry(NamedTuple):
@@ -277,8 +276,8 @@ def _inverse(geometry, signs, rest, limits, passive_limits, foot, q, closure, st
     if not all_finite(foot):
         status[0] = INVALID_INPUT
         return
-    psi_s, foot_z = swing_plane(foot[0], foot[2])
-    beta, alpha = cranks_from_foot(g, branch.rhombus, foot[1], foot_z)
+    psi_s, foot_z = swing_plane(-foot[1], foot[2])
+    beta, alpha = cranks_from_foot(g, branch.rhombus, foot[0], foot_z)
     if math.isnan(beta):
         status[0] = UNREACHABLE
         return
@@ -307,7 +306,7 @@ def _forward(geometry, signs, rest, limits, passive_limits, q, foot, closure, st
         status[0] = UNREACHABLE
         return
     foot_x, foot_z = foot_in_plane(g, beta, alpha)
-    foot[0], foot[1], foot[2] = foot_z * math.sin(psi_s), foot_x, foot_z * math.cos(psi_s)
+    foot[0], foot[1], foot[2] = foot_x, -foot_z * math.sin(psi_s), foot_z * math.cos(psi_s)
     closure[0], closure[1], closure[2] = beta, alpha, psi_s
     status[0] = status_of_point(g, branch, rest, limits, passive_limits, q, closure)
 
@@ -330,8 +329,8 @@ def _jacobian(geometry, closure, jacobian):  # type: ignore[no-untyped-def]
     _, foot_z = foot_in_plane(g, beta, alpha)
     lever = swing_lever(g, psi_s)
     cs, ss = math.cos(psi_s), math.sin(psi_s)
-    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2] = z_2 * ss, z_4 * ss, foot_z * cs / lever
-    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2] = x_2, x_4, 0.0
+    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2] = x_2, x_4, 0.0
+    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2] = -z_2 * ss, -z_4 * ss, -foot_z * cs / lever
     jacobian[2, 0], jacobian[2, 1], jacobian[2, 2] = z_2 * cs, z_4 * cs, -foot_z * ss / lever
 
 
@@ -343,11 +342,11 @@ def _angular_jacobian(geometry, closure, jacobian):  # type: ignore[no-untyped-d
     cs, ss = math.cos(closure[2]), math.sin(closure[2])
     for k in range(2):
         psi_rate = 0.5 / (lever_2 if k == 0 else lever_4)
-        jacobian[0, k] = psi_rate * cs
-        jacobian[1, k] = 0.0
+        jacobian[0, k] = 0.0
+        jacobian[1, k] = -psi_rate * cs
         jacobian[2, k] = -psi_rate * ss
-    jacobian[0, 2] = 0.0
-    jacobian[1, 2] = 1.0 / swing_lever(g, closure[2])
+    jacobian[0, 2] = 1.0 / swing_lever(g, closure[2])
+    jacobian[1, 2] = 0.0
     jacobian[2, 2] = 0.0
 
 
@@ -385,8 +384,8 @@ class DoubleRhombus(Dimensioned):
     """The leg with double rhombus and three cylinders; defaults are the paper's dimensions.
 
     Joint positions are the lengths of the cylinders, pin to pin. The foot position is that of I in
-    the leg frame, whose origin is O. The side swing's body pin K lies on the -x side, so x points
-    away from the body.
+    the leg frame, whose origin is O. The side swing's body pin K lies on the left, so this is a leg
+    of the right side; its mirror image is one of the left side.
 
     Raises:
         GeometryError: If a dimension is impossible, or a cylinder has no lever in the initial
@@ -542,8 +541,8 @@ class DoubleRhombus(Dimensioned):
         """J_omega of the foot's angular velocity, omega = J_omega q' (..., 3, 3) [rad/m].
 
         The foot's body is the one that carries the paper's frame UIW, with W along IO: the spring
-        and foot below I, held in line with the diagonal of the rhombi. It turns by -phi' about the
-        swung x axis and by psi_s' about the leg's y axis.
+        and foot below I, held in line with the diagonal of the rhombi. It turns by phi' about the
+        swung y axis and by psi_s' about the leg's x axis.
         """
         return _angular_jacobian(self._geometry, posture.closure)
 
@@ -568,12 +567,12 @@ class DoubleRhombus(Dimensioned):
         def in_plane(length: float, angle: ArrayLike) -> FloatArray:
             """Vector length u(angle) of the swung plane, in the leg frame."""
             x, z = length * np.cos(angle), length * np.sin(angle)
-            return np.stack([z * np.sin(psi_s), x + 0.0 * psi_s, z * np.cos(psi_s)], axis=-1)
+            return np.stack([x + 0.0 * psi_s, -z * np.sin(psi_s), z * np.cos(psi_s)], axis=-1)
 
         def across(length: float, angle: ArrayLike) -> FloatArray:
-            """Vector of the plane of the side swing, at an angle from +z about +y."""
+            """Vector of the plane of the side swing, at an angle from +z about +x."""
             angle = angle + 0.0 * psi_s
-            components = [np.sin(angle), np.zeros_like(psi_s), np.cos(angle)]
+            components = [np.zeros_like(psi_s), -np.sin(angle), np.cos(angle)]
             return length * np.stack(components, axis=-1)
 
         origin = in_plane(0.0, 0.0)

@@ -5,8 +5,11 @@ by beta about X: slides A and B on one rail along X carry bars with a pin at eac
 parallel rail carries a rod with a universal joint at each end. An auxiliary shaft turns a tool on
 the platform (see `universal_joints`).
 
-Symbols of the code are the paper's. The leg frame is the paper's frame OXYZ, Z from the carriage to
-the platform. On the carriage, with s2 of the slide E as y:
+Symbols of the code are the paper's, and so is the leg frame: OXYZ, Z from the carriage to the
+platform. REP-103 names x, y and z by a body's forward, left and up; a manipulator on a gantry does
+not travel, and with X along the rails as its forward the paper's frame is one of REP-103, in which
+the task coordinates x, y, z and beta keep the paper's meaning. On the carriage, with s2 of the
+slide E as y:
 
     A'' = (s1 - b1, 0, 0)      A' = (x - a, 0, z)      |A'A''| = L1, (2)
     B'' = (s3 + b2, 0, 0)      B' = (x + a, 0, z)      |B'B''| = L2, (3)
@@ -472,10 +475,10 @@ class GantryHybrid(Dimensioned):
     slide_a_start: float = parameter("distance O' A with s1 = 0", "b1", "length", 0.15025)
     slide_b_start: float = parameter("distance O' B with s3 = 0", "b2", "length", 0.15025)
     slide_c_start: float = offset("X of C from D with s4 = 0", "c", 0.10308)
-    rail_c_forward: float = offset("Y of the rail D C", "d", 0.200)
+    rail_c_left: float = offset("Y of the rail D C", "d", 0.200)
     platform_arm: float = parameter("platform's middle O'' to C'", "e", "length", 0.150)
-    shaft_base_forward: float = offset("Y of the shaft's joint F on the carriage", "ee", 0.100)
-    shaft_platform_forward: float = offset("Y'' of the shaft's joint F' on it", "ee'", 0.080)
+    shaft_base_left: float = offset("Y of the shaft's joint F on the carriage", "ee", 0.100)
+    shaft_platform_left: float = offset("Y'' of the shaft's joint F' on it", "ee'", 0.080)
     bar_a_length: float = parameter("bar A' A''", "L1", "length", 0.255)
     bar_b_length: float = parameter("bar B' B''", "L2", "length", 0.255)
     rod_c_length: float = parameter("rod C' C''", "L3", "length", 0.275)
@@ -496,7 +499,7 @@ class GantryHybrid(Dimensioned):
         self.check_fields()
         if not all(map(math.isfinite, self._initial_closure)):
             bars = "bar_a_length (L1), bar_b_length (L2), slide_a_start (b1), slide_b_start (b2)"
-            rod = "rod_c_length (L3), slide_c_start (c), rail_c_forward (d), platform_arm (e)"
+            rod = "rod_c_length (L3), slide_c_start (c), rail_c_left (d), platform_arm (e)"
             raise GeometryError(
                 "with all slides at zero the bars do not reach the platform: change "
                 f"{bars}, platform_half_width (a) or {rod}"
@@ -510,7 +513,7 @@ class GantryHybrid(Dimensioned):
     @cached_property
     def auxiliary_chain(self) -> AuxiliaryChain:
         """The shaft that turns a tool on the platform."""
-        return AuxiliaryChain(self.shaft_base_forward, self.shaft_platform_forward)
+        return AuxiliaryChain(self.shaft_base_left, self.shaft_platform_left)
 
     @cached_property
     def _initial_closure(self) -> FloatArray:

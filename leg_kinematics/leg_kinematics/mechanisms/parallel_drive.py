@@ -1,14 +1,15 @@
 """`parallel_drive`: the 2RUS+RU parallel-driving leg with a pantograph (Zhang, Jin, Zhang 2017).
 
-Three cranks whose axes are parallel to x move a platform: two outer cranks through rods (2RUS) and
+Three cranks with axes across the leg move a platform: two outer cranks through rods (2RUS) and
 a centre crank through a universal joint (RU). The platform's point S drives a parallelogram
 (pantograph) that swings about the hip H and magnifies the motion to the foot C.
 
 The paper leaves the assembly to a reference that is not at hand. The geometry is therefore a
 reconstruction, with two fitted crank zero angles as parameters; see the README.
 
-Symbols of the code are the paper's; frame {P} has its origin at the middle of the outer crank axes,
-the leg frame {C} at the hip H, both with the same axes. `u(t) = (0, cos t, sin t)`.
+Symbols and axes of the code are the paper's: x to the right, y forward, z up (see `walking_axes`).
+Frame {P} has its origin at the middle of the outer crank axes, {C} at the hip H; the leg frame is
+{C} with the axes of REP-103. `u(t) = (0, cos t, sin t)`.
 
     U_i = R_Di + m_i u(phi_i)                       crank pins, i = 1, 2, 3
     w   = (sin b, cos b cos a, cos b sin a)         direction U3 -> G of the platform
@@ -40,6 +41,7 @@ from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import arctan2, included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import Joint, Linkage, Posture
+from leg_kinematics.mechanisms.walking_axes import in_leg_frame, in_walking_axes, leg_vectors
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `_passive_rest`
@@ -548,7 +550,7 @@ def walking_rates(
 def jacobian_columns(
     g: Geometry, p: Pose, f1: Gradient, f2: Gradient, crank: int
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return column `crank` of J of equation (1), foot velocity, and of J_omega of (2), of R2C."""
+    """Return column `crank` of J of (1), foot velocity, and of J_omega of (2), in the leg frame."""
     upper = g.l4 + g.l5 + g.l7
     zeta = upper * p.s1 + g.l6 * p.s2
     rate_1, rate_2, rate_3 = walking_rates(g, p, f1, f2, crank)
@@ -559,7 +561,8 @@ def jacobian_columns(
         y_rate,
         zeta_rate * p.c3 - zeta * p.s3 * rate_3,
     )
-    return velocity, (rate_1 * p.c3, rate_3, -rate_1 * p.s3)
+    omega = rate_1 * p.c3, rate_3, -rate_1 * p.s3  # of the shank R2 C
+    return in_leg_frame(*velocity), in_leg_frame(*omega)
 
 
 # --------------------------------------------------------------------------- kernels
@@ -575,7 +578,7 @@ def solve_foot(
     g: Geometry, branch: Branch, rest: Numbers, limits: Numbers, block: FloatArray, i: int
 ) -> Pose:
     """Solve point i of a block: fill crank angles, closure and status, return the pose."""
-    x, y, z = get3(block, X, i)
+    x, y, z = in_walking_axes(*get3(block, X, i))
     pose = pose_of_foot(g, branch, x, y, z)
     q = crank_angles(g, pose)
     status = status_of_pose(g, branch, rest, limits, q, pose)
@@ -605,7 +608,7 @@ def unpacked(parameters: FloatArray) -> tuple[Geometry, Branch, Numbers, Numbers
 
 @points_kernel("(p),(points,3)->(points,8),(points)", "f8 f8 f8 u1")
 def _inverse(parameters, foot, coordinates, status):
-    """Foot positions in {C} to crank angles and closure."""
+    """Foot positions to crank angles and closure."""
     g, branch, rest, limits = unpacked(parameters)
     block = np.empty((ROWS, BLOCK))
     for start in range(0, len(foot), BLOCK):
@@ -662,7 +665,7 @@ def solve_cranks(
     if not math.isfinite(th1 + th2):
         return UNREACHABLE
     closure[0], closure[1], closure[2], closure[3], closure[4] = a, b, th1, th2, th3
-    foot[0], foot[1], foot[2] = foot_point(g, th1, th2, th3)
+    foot[0], foot[1], foot[2] = in_leg_frame(*foot_point(g, th1, th2, th3))
     pose = pose_of_angles(g, q, closure)
     return status_of_pose(g, branch, rest, limits, (q[0], q[1], q[2]), pose)
 
@@ -679,7 +682,7 @@ def fill_twist(g: Geometry, p: Pose, twist: FloatArray) -> None:
 
 @points_kernel("(p),(points,3)->(points,3),(points,5),(points)", "f8 f8 f8 f8 u1")
 def _forward(parameters, q, foot, closure, status):
-    """Crank angles to foot position in {C} and closure."""
+    """Crank angles to foot position and closure."""
     g, branch, rest, limits = unpacked(parameters)
     for i in range(len(q)):
         status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
@@ -703,7 +706,7 @@ def _twist(geometry, q, closure, twist):
 
 @kernel("(g),(n),(c),(w)->(n,w)", "f8[:], f8[:], f8[:], f8[:], f8[:,:]")
 def _constraint_jacobian(geometry, q, closure, shape, jacobian):
-    """Constraint wrenches of the RU limb; `shape` only sets the length of a wrench."""
+    """Constraint wrenches in the paper's axes; `shape` only sets the length of a wrench."""
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     p = pose_of_angles(g, q, closure)
     # U3 seen from G is -l3 w; the moments are its cross products with s_q2 and n2
@@ -764,7 +767,7 @@ FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
 class ParallelDrive(Dimensioned):
     """The parallel-driving leg; defaults are the paper's initial dimensions.
 
-    The foot position is that of C in the leg frame {C}, whose origin is the hip H.
+    The foot position is that of C in the leg frame, whose origin is the hip H.
 
     Raises:
         GeometryError: If a dimension is impossible or the leg cannot be assembled.
@@ -787,14 +790,14 @@ class ParallelDrive(Dimensioned):
 
     crank_spacing: float = parameter("distance R_D1 R_D2 of the outer cranks", "d", "length", 0.276)
     center_crank_drop: float = offset("depth of R_D3 below the outer crank axis", "h1", 0.070)
-    center_crank_forward: float = offset("y of R_D3", "e", 0.0)
+    center_crank_forward: float = offset("R_D3 in front of the outer crank axis", "e", 0.0)
     crank_length: float = parameter("outer cranks R_Di U_i", "m1", "length", 0.200)
     center_crank_length: float = parameter("centre crank R_D3 U3", "m3", "length", 0.200)
     rod_length: float = parameter("rods U_i S_i", "l1", "length", 0.220)
     platform_arm: float = parameter("arms S_i G of the platform", "a", "length", 0.055)
     platform_length: float = parameter("platform U3 G", "l3", "length", 0.250)
     platform_post: float = parameter("post G S of the platform", "l33", "length", 0.120)
-    hip_forward: float = offset("y of the hip H from the crank axis", "l_y", 0.190)
+    hip_forward: float = offset("the hip H in front of the outer crank axis", "l_y", 0.190)
     hip_drop: float = offset("depth of the hip H below the crank axis", "l_z", 0.055)
     thigh_upper: float = parameter("R4 R1", "l4", "length", 0.200)
     drive_lever: float = parameter("connecting link R1 B", "c", "length", 0.110)
@@ -803,10 +806,13 @@ class ParallelDrive(Dimensioned):
     parallelogram_link: float = parameter("long link R1 R2", "l6", "length", 0.300)
     shank_length: float = parameter("shank R5 C", "l7", "length", 0.450)
     crank_zero: float = parameter(
-        "outer cranks' zero from +y towards +z (fitted)", "phi_1", "angle", math.radians(-36.0)
+        "outer cranks' zero from forward towards up (fitted)", "phi_1", "angle", math.radians(-36.0)
     )
     center_crank_zero: float = parameter(
-        "centre crank's zero from +y towards +z (fitted)", "phi_3", "angle", math.radians(-106.0)
+        "centre crank's zero from forward towards up (fitted)",
+        "phi_3",
+        "angle",
+        math.radians(-106.0),
     )
 
     joint_ranges: tuple[tuple[float, float], ...] = ((-RANGE, RANGE),) * 3
@@ -970,13 +976,14 @@ class ParallelDrive(Dimensioned):
 
         Rows are the constraint wrenches of the RU limb at G, a force part (3) [1] then a moment
         part (3) [1 for the first row, m for the others]: a pure moment about
-        n1 = s_q2 x s_q3 and two forces through U3 along s_q2 (the x axis) and
+        n1 = s_q2 x s_q3 and two forces through U3 along s_q2 (to the right) and
         n2 = (s_q1 x n3) x s_q2 = n3, the direction of the centre crank.
         """
-        jacobian: FloatArray = _constraint_jacobian(
+        jacobian = _constraint_jacobian(
             self._geometry, posture.joint_positions, posture.closure, np.zeros(6)
         )
-        return jacobian
+        parts = leg_vectors(jacobian[..., :3]), leg_vectors(jacobian[..., 3:])
+        return np.concatenate(parts, axis=-1)
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them."""
@@ -1031,6 +1038,6 @@ class ParallelDrive(Dimensioned):
         )
         return Linkage(
             names,
-            np.stack([p - hip for p in points.values()], axis=-2),
+            leg_vectors(np.stack([p - hip for p in points.values()], axis=-2)),
             tuple(tuple(names.index(n) for n in bar) for bar in bars),
         )

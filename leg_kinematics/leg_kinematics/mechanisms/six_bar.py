@@ -198,7 +198,7 @@ def _motion(constants, sides, q, shape, velocity, acceleration, turning):  # typ
     p = linkage_points(k, sides, turning_pin(k.zero + q[0]))[0]
     velocity[0], velocity[1], velocity[2] = in_leg_frame(k.crank, p.g.vx, p.g.vy)
     acceleration[0], acceleration[1], acceleration[2] = in_leg_frame(k.crank, p.g.ax, p.g.ay)
-    turning[0], turning[1], turning[2] = -turning_rate(p.c, p.f), 0.0, 0.0
+    turning[0], turning[1], turning[2] = 0.0, turning_rate(p.c, p.f), 0.0
 
 
 @points_kernel(f"(c),(points,s),(points,1)->(points,{POINTS_SIZE},3)", "f8 f8 f8 f8")

@@ -21,7 +21,7 @@ class Footholds(NamedTuple):
         verdict: A `leg_msgs/FootholdVerdict` constant each (...,); 0 is feasible.
         status: Status of the poses alone (...,).
         load_capacity: Greatest force normal to the ground (...,) [N].
-        rated_friction: mu_e = |F_y| / |F_z| (...,).
+        rated_friction: mu_e = |F_x| / |F_z|, forward over vertical (...,).
         rated_friction_full: The same with both horizontal components (...,).
         friction_margin: friction_coefficient - rated_friction (...,).
         utilisation: Largest effort / effort limit at the required load (...,), 1 = at the limit.

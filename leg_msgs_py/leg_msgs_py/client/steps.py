@@ -25,7 +25,8 @@ class StepLengths(NamedTuple):
         start_limits: `leg_msgs/FootholdVerdict` just behind the rear ends (L, ...).
         end_limits: The same just before the front ends (L, ...).
         load_capacity: Load capacity along the stances (L, ..., P) [N].
-        rated_friction: mu_e along them (L, ..., P).
+        rated_friction: mu_e = |F_x| / |F_z|, forward over vertical, along them (L, ..., P).
+        rated_friction_full: sqrt(F_x² + F_y²) / |F_z| along them (L, ..., P).
         common_lengths: The step that all legs can make together (...,) [m].
         limiting_leg: Index of the leg with the shortest step (...,).
         best_height: Flat index of the longest common step; -1 if there is none.
@@ -40,6 +41,7 @@ class StepLengths(NamedTuple):
     end_limits: NDArray[np.uint8]
     load_capacity: FloatArray
     rated_friction: FloatArray
+    rated_friction_full: FloatArray
     common_lengths: FloatArray
     limiting_leg: NDArray[np.int32]
     best_height: int
@@ -68,7 +70,7 @@ def query_step_length(
         ground: The ground: its name, its friction coefficient, or a `Ground` with a normal.
         load: Force normal to the ground that each leg has to bear [N].
         lateral_offsets: Distance of each leg's line from the origin of its own frame, to the
-            right of the walking direction (L,), or one for all [m]; () for none.
+            left of the walking direction (L,), or one for all [m]; () for none.
         direction: Walking direction, horizontal (3,) of any length; zero is forward.
         moment: Moment of the ground on the foot (3,) [N.m]; zero on hard ground.
         any_direction_moment: Further horizontal moment of unknown direction [N.m].
@@ -104,6 +106,7 @@ def query_step_length(
             end_limits=from_field(response.end_limits, batch, np.uint8),
             load_capacity=from_field(response.load_capacity, profile),
             rated_friction=from_field(response.rated_friction, profile),
+            rated_friction_full=from_field(response.rated_friction_full, profile),
             common_lengths=from_field(response.common_lengths, levels.shape),
             limiting_leg=from_field(response.limiting_leg, levels.shape, np.int32),
             best_height=response.best_height,

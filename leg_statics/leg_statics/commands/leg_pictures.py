@@ -125,7 +125,7 @@ def friction_picture(
     grounds: Sequence[Ground],
     heights: Sequence[float] = (),
     *,
-    x: float = 0.0,
+    y: float = 0.0,
     title: str = "",
     figure: Figure | None = None,
 ) -> Figure:
@@ -136,7 +136,7 @@ def friction_picture(
         grounds: Grounds to compare with.
         heights: Height of the foot for each mechanism, or one for all [m]; by default that of
             each one's initial posture.
-        x: x of the line in the leg frame [m].
+        y: y of the line in the leg frame [m].
         title: Title of the figure.
         figure: Figure to draw into.
 
@@ -153,7 +153,7 @@ def friction_picture(
     if len(chosen) != len(mechanisms):
         raise ShapeError(f"{len(mechanisms)} mechanisms need as many heights, got {len(chosen)}")
     curves = {
-        name: line_map(mechanism, x, height, LINE_RESOLUTION, layers=[RATED_FRICTION])
+        name: line_map(mechanism, y, height, LINE_RESOLUTION, layers=[RATED_FRICTION])
         for (name, mechanism), height in zip(mechanisms.items(), chosen, strict=True)
     }
     return plot_rated_friction(curves, grounds, title=title, figure=figure)
@@ -224,14 +224,14 @@ def linkage_picture(
     forces: dict[str, Any] = {"side": None, "front": None}
     if is_spatial_leg(mechanism):
         jacobian = mechanism.jacobian(posture)
-        forces["side"] = force_polygon(jacobian[[1, 2]], leg.effort_limits)
-        forces["front"] = force_polygon(jacobian[[0, 2]], leg.effort_limits)
+        forces["side"] = force_polygon(jacobian[[0, 2]], leg.effort_limits)
+        forces["front"] = force_polygon(jacobian[[1, 2]], leg.effort_limits)
     foot = posture.foot_position
     return plot_linkage(
         mechanism.linkage(posture),
         foot,
-        View(vertical_section(mechanism, foot, 1), forces["side"]),
-        View(vertical_section(mechanism, foot, 0), forces["front"]),
+        View(vertical_section(mechanism, foot, 0), forces["side"]),
+        View(vertical_section(mechanism, foot, 1), forces["front"]),
         friction,
         title=title,
         figure=figure,

@@ -154,7 +154,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--figure",
         metavar="FIGURE",
         help="a figure of Zhang, Jin, Zhang 2017 (2: k, 5a: eta_cF, 5b: mu_e, 5c: eta_cM, "
-        "6a: k_cf, 6b: k_cm, 8: mu_e along y), or steps (step length against height), capacity "
+        "6a: k_cf, 6b: k_cm, 8: mu_e along x), or steps (step length against height), capacity "
         "(load capacity on every ground), linkage (side and front view)",
     )
     what.add_argument("--all", metavar="DIR", help="every figure that the leg has, into a folder")

@@ -166,7 +166,7 @@ def jansen_points(crank_angles: ArrayLike) -> dict[str, ComplexArray]:
     """Return the points of Jansen's linkage by name, each of the shape of `crank_angles` [rad]."""
     linkage = JANSEN.linkage(JANSEN.forward(as_array("crank_angles", crank_angles)[..., None]))
     return {
-        name: -linkage.points[..., i, 1] + 1j * linkage.points[..., i, 2]
+        name: -linkage.points[..., i, 0] + 1j * linkage.points[..., i, 2]
         for i, name in enumerate(linkage.names)
     }
 

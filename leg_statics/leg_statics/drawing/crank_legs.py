@@ -264,4 +264,4 @@ def _closed(values: FloatArray) -> FloatArray:
 
 def _in_plane(points: FloatArray, scale: Scale) -> tuple[FloatArray, FloatArray]:
     """Return points of the leg frame as the paper draws them: the leg walks to the left."""
-    return -scale.factor * points[..., 1], scale.factor * points[..., 2]
+    return -scale.factor * points[..., 0], scale.factor * points[..., 2]

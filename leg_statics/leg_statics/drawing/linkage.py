@@ -52,13 +52,13 @@ def plot_linkage(
     title: str = "",
     figure: Figure | None = None,
 ) -> Figure:
-    """Draw a leg from the side (y, z) and from the front (x, z) with its workspace.
+    """Draw a leg from its right side (x, z) and from the front (y, z) with its workspace.
 
     Args:
         linkage: Points (p, 3) and bars of the leg in one posture.
         foot: The foot position (t,) [m]; t = 3 for a leg that walks.
-        side: What to show in the plane of y and z.
-        front: What to show in the plane of x and z.
+        side: What to show in the plane of x and z.
+        front: What to show in the plane of y and z.
         friction: Friction coefficient of the ground; if given, the friction cone is drawn.
         title: Title of the figure.
         figure: Figure to draw into.
@@ -72,10 +72,10 @@ def plot_linkage(
     task_position = as_array("foot", foot)
     place = task_position[:3]
     cone = None if friction is None else float(as_non_negative("friction", friction))
-    views = {"side view": (side, [1, 2]), "front view": (front, [0, 2])}
+    views = {"side view": (side, [0, 2]), "front view": (front, [1, 2])}
     has_forces = cone is not None or any(view.forces is not None for view, _ in views.values())
     low, high = _box(linkage.points, place, side, front, has_forces)
-    widths, tall = (high - low)[[1, 0]], float((high - low)[2])
+    widths, tall = (high - low)[:2], float((high - low)[2])
     height = (WIDTH - 22.0) * tall / np.sum(widths) + (33.0 if title else 28.0)
     figure = new_figure(figure, height)
     axes = figure.subplots(1, 2, sharey=True, width_ratios=widths.tolist())
@@ -89,9 +89,9 @@ def plot_linkage(
         plain(ax)
         ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 4, 5, 10]))
     _draw_forces(axes, place, list(views.values()), FORCE_SIZE * tall)
-    walking = ", walking to the right" if len(task_position) == 3 else ""
-    axes[0].set_xlabel(f"$y$ [m]{walking}", fontsize=FONT_SIZE)
-    axes[1].set_xlabel("$x$ [m]", fontsize=FONT_SIZE)
+    walks = len(task_position) == 3
+    axes[0].set_xlabel("$x$ [m], forward" if walks else "$x$ [m]", fontsize=FONT_SIZE)
+    axes[1].set_xlabel("$y$ [m], left" if walks else "$y$ [m]", fontsize=FONT_SIZE)
     axes[0].set_ylabel("$z$ [m]", fontsize=FONT_SIZE)
     return with_legend(figure, axes[0], title, 2)
 
@@ -100,7 +100,7 @@ def _box(
     points: FloatArray, foot: FloatArray, side: View, front: View, has_forces: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Return the corners of a box that holds linkage, workspace and forces (3,) [m]."""
-    ranges = front.workspace.across, side.workspace.across, side.workspace.z
+    ranges = side.workspace.across, front.workspace.across, side.workspace.z
     bounds = np.array([[values[0], values[-1]] for values in ranges])
     corners = np.concatenate([points, bounds.T])
     low, high = corners.min(axis=0), corners.max(axis=0)

@@ -34,6 +34,8 @@ def plot_maps(
 ) -> Figure:
     """Draw one layer of several plane maps as small multiples with one colour scale.
 
+    The maps are seen from above, the walking direction x upwards and y to the left.
+
     Args:
         maps: Maps of one plane each, by the title of their panel.
         layer: Name of the layer.
@@ -54,7 +56,7 @@ def plot_maps(
     box = _common_box([(m.x, m.y, v) for m, v in zip(maps.values(), values, strict=True)])
     columns = {1: 1, 2: 2, 4: 2}.get(len(maps), 3)
     rows = -(-len(maps) // columns)
-    panel_height = (WIDTH - 12.0 - 3.0 * columns) / columns * np.ptp(box[1]) / np.ptp(box[0])
+    panel_height = (WIDTH - 12.0 - 3.0 * columns) / columns * np.ptp(box[0]) / np.ptp(box[1])
     gaps = 8.0 if len(maps) % columns else 0.0  # a panel over an empty place has its own x axis
     norm, levels, extend = _colour_scale(finite)
     height = rows * (panel_height + 5.0) + gaps + (22.0 if len(levels) else 15.0)
@@ -62,12 +64,12 @@ def plot_maps(
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for ax, (name, m), v in zip(axes, maps.items(), values, strict=False):
         mesh = ax.pcolormesh(
-            m.x, m.y, v, shading="nearest", cmap=COLOUR_MAP, norm=norm, rasterized=True
+            m.y, m.x, v.T, shading="nearest", cmap=COLOUR_MAP, norm=norm, rasterized=True
         )
         if len(levels):
             _contours(ax, m, v, levels, norm, labelled=columns < 3)
         ax.set_title(name, fontsize=FONT_SIZE, pad=3)
-        ax.set(xlim=box[0], ylim=box[1], aspect="equal")
+        ax.set(xlim=box[1][::-1], ylim=box[0], aspect="equal")
     _tidy_grid(axes, len(maps), columns)
     if len(levels):
         bar = figure.colorbar(
@@ -131,7 +133,7 @@ def _contours(
     if not len(inside):
         return
     lines = ax.contour(
-        m.x, m.y, values, levels=inside, colors=_line_colours(inside, norm), linewidths=0.5
+        m.y, m.x, values.T, levels=inside, colors=_line_colours(inside, norm), linewidths=0.5
     )
     if labelled:
         texts = ax.clabel(lines, fontsize=SMALL_FONT_SIZE, fmt=lambda v: f"{v:g}")
@@ -148,7 +150,7 @@ def _tidy_grid(axes: Any, used: int, columns: int) -> None:
         ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 4, 5, 10]))
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if k + columns >= used:
-            ax.set_xlabel("$x$ [m]", fontsize=FONT_SIZE)
+            ax.set_xlabel("$y$ [m], left", fontsize=FONT_SIZE)
             ax.tick_params(labelbottom=True)
         if k % columns == 0:
-            ax.set_ylabel("$y$ [m]", fontsize=FONT_SIZE)
+            ax.set_ylabel("$x$ [m], forward", fontsize=FONT_SIZE)

@@ -247,17 +247,19 @@ class StaticsNode(RobotNode):
             states.condition_number.tolist(),
             states.load_capacity.tolist(),
             states.rated_friction.tolist(),
+            states.rated_friction_full.tolist(),
             states.utilisation.tolist(),
             strict=True,
         )
-        for leg, joints, status, foot, velocity, condition, capacity, friction, used in rows:
+        for leg, joints, status, foot, velocity, condition, capacity, mu_e, mu_full, used in rows:
             leg.joint_positions = to_field(joints)
             leg.status = status
             leg.foot_position = foot
             leg.foot_velocity = velocity
             leg.condition_number = condition
             leg.load_capacity = capacity
-            leg.rated_friction = friction
+            leg.rated_friction = mu_e
+            leg.rated_friction_full = mu_full
             leg.utilisation = used
         return message
 

@@ -21,10 +21,13 @@ from leg_kinematics.nodes.requests import (
 from leg_kinematics.robot import Leg, Mount, Robot
 from leg_statics.grounds import Grounds
 from leg_statics.nodes.contacts import read_contact
-from leg_statics.step_length import PROFILE_POINTS, CommonStep, Criterion, common_step
-
-BODY_FORWARD = (1.0, 0.0, 0.0)  # REP-103
-LEG_FORWARD = (0.0, 1.0, 0.0)
+from leg_statics.step_length import (
+    FORWARD,
+    PROFILE_POINTS,
+    CommonStep,
+    Criterion,
+    common_step,
+)
 
 
 def fill_step_length(
@@ -53,7 +56,7 @@ def fill_step_length(
     offsets = _lateral_offsets(request, legs)
     direction = _finite("direction", request.direction)
     if not direction.any():
-        direction = np.array(BODY_FORWARD if on_body else LEG_FORWARD)
+        direction = np.array(FORWARD)
     common = common_step(
         {leg.name: leg for leg in legs},
         -heights,
@@ -133,6 +136,7 @@ def _fill(response: Any, legs: Sequence[Leg], common: CommonStep) -> None:
     response.end_limits = to_field([step.end_limit for step in steps], np.uint8)
     response.load_capacity = to_field([step.load_capacity for step in steps])
     response.rated_friction = to_field([step.rated_friction for step in steps])
+    response.rated_friction_full = to_field([step.rated_friction_full for step in steps])
     response.profile_points = PROFILE_POINTS
     response.common_lengths = to_field(common.length)
     response.limiting_leg = to_field(common.limiting_leg, np.int32)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from leg_kinematics import ParallelDrive
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.mechanisms.walking_axes import leg_vectors
 from leg_statics.design.designs import STEP_LENGTH, Conditions, Evaluation, evaluate_design
 from leg_statics.design.search.workers import LocalWorkers
 from leg_statics.footholds import Contact
@@ -76,7 +77,7 @@ def legs(**changes: float) -> dict[str, ParallelDrive]:
 
 
 class Slices(NamedTuple):
-    """Indices over the workspace in planes of equal height.
+    """Indices over the workspace in planes of equal height, in the paper's axes.
 
     Attributes:
         heights: h of each plane (k,) [m].
@@ -100,7 +101,7 @@ def slices(leg: ParallelDrive, heights: FloatArray, spacing: float = 0.015) -> S
     x = spacing * np.arange(-40, 41)
     y = spacing * np.arange(-50, 51)
     h_grid, x_grid, y_grid = np.meshgrid(heights, x, y, indexing="ij")
-    posture = leg.inverse(np.stack([x_grid, y_grid, h_grid], axis=-1))
+    posture = leg.inverse(leg_vectors(np.stack([x_grid, y_grid, h_grid], axis=-1)))
     names, values = evaluate_indices(leg, posture)
     mirror = values[:, ::-1]
     with np.errstate(invalid="ignore"):

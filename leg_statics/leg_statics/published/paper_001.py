@@ -77,8 +77,8 @@ def transmission_at(
         varphi: Angle AOF [rad].
     """
     leg = DoubleRhombus(upper_crank_angle=varphi)
-    y, z = np.broadcast_arrays(-np.multiply(radius, np.sin(phi)), -np.multiply(radius, np.cos(phi)))
-    posture = leg.inverse(np.stack([np.zeros_like(y), y, z], axis=-1))
+    x, z = np.broadcast_arrays(-np.multiply(radius, np.sin(phi)), -np.multiply(radius, np.cos(phi)))
+    posture = leg.inverse(np.stack([x, np.zeros_like(x), z], axis=-1))
     return force_transmission(leg.planar_jacobian(posture))
 
 

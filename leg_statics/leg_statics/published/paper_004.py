@@ -26,10 +26,10 @@ EXAMPLE_GEOMETRY = {
     "slide_a_start": 0.15025,
     "slide_b_start": 0.15025,
     "slide_c_start": 0.10308,
-    "rail_c_forward": 0.200,
+    "rail_c_left": 0.200,
     "platform_arm": 0.150,
-    "shaft_base_forward": 0.100,
-    "shaft_platform_forward": 0.080,
+    "shaft_base_left": 0.100,
+    "shaft_platform_left": 0.080,
     "bar_a_length": 0.255,
     "bar_b_length": 0.255,
     "rod_c_length": 0.275,
@@ -135,7 +135,7 @@ def printed_forward_acceleration(manipulator: GantryHybrid, drives: DriveMotion)
 def printed_second_bend(manipulator: GantryHybrid, position: FloatArray) -> FloatArray:
     """Return phi_2 (...) [rad] by its cosine as printed, with ee' in the numerator."""
     _, _, z, beta = np.moveaxis(position, -1, 0)
-    tip = manipulator.shaft_platform_forward
+    tip = manipulator.shaft_platform_left
     length = manipulator.auxiliary_chain.length(position)
     return np.arccos((z * np.cos(beta) + tip * np.sin(beta)) / length)
 

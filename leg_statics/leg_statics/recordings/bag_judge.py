@@ -90,6 +90,7 @@ class Judgement(NamedTuple):
         condition_number: (T,).
         load_capacity: (T,) [N].
         rated_friction: mu_e (T,).
+        rated_friction_full: Its full form, with both horizontal components (T,).
         utilisation: Share of the effort limit that the worst joint uses (T,).
         joint_utilisation: The same of every joint (T, n).
         range_use: Largest share of the way from the middle of its range to its end that an
@@ -112,6 +113,7 @@ class Judgement(NamedTuple):
     condition_number: FloatArray
     load_capacity: FloatArray
     rated_friction: FloatArray
+    rated_friction_full: FloatArray
     utilisation: FloatArray
     joint_utilisation: FloatArray
     range_use: FloatArray
@@ -377,6 +379,7 @@ class BagJudge:
             condition_number=states.condition_number[:, k],
             load_capacity=states.load_capacity[:, k],
             rated_friction=states.rated_friction[:, k],
+            rated_friction_full=states.rated_friction_full[:, k],
             utilisation=states.utilisation[:, k],
             joint_utilisation=unknown if efforts is None else _shares(efforts, leg.effort_limits),
             range_use=_range_use(positions, mechanism.joint_limits),

@@ -54,6 +54,7 @@ def watched_quantities(friction: float) -> tuple[Quantity, ...]:
         Quantity("utilisation", "effort / limit, worst joint", "", "high", 1.0),
         Quantity("load_capacity", "load capacity", "N", "low"),
         Quantity("rated_friction", "rated friction mu_e", "", "high", friction),
+        Quantity("rated_friction_full", "rated friction mu_e,xy", "", "high", friction),
         Quantity("range_use", "joint range used", "", "high", 1.0),
         Quantity("passive_range_use", "passive joint range used", "", "high", 1.0),
         Quantity("condition_number", "condition number", "", "high"),

@@ -93,6 +93,7 @@ class JudgedBag:
             condition_number=float(judgement.condition_number[k]),
             load_capacity=float(judgement.load_capacity[k]),
             rated_friction=float(judgement.rated_friction[k]),
+            rated_friction_full=float(judgement.rated_friction_full[k]),
             utilisation=float(judgement.utilisation[k]),
         )
 

@@ -41,7 +41,8 @@ LEGEND = (
     "which the message was recorded.",
     "Shares are 1 at the limit. Joint range used: 0 in the middle of the range, 1 at its end.",
     "Load capacity: greatest vertical ground reaction within the effort limits on this ground. "
-    "Rated friction: what the ground must offer along the walking direction at full efforts.",
+    "Rated friction: what the ground must offer at full efforts, along the walking direction "
+    "(mu_e) and in both horizontal directions (mu_e,xy).",
     "The leg's own weight and dynamics are left out, as in the statics node.",
     "Answers to planners' queries are found anew, with this robot, these grounds and the recorded "
     "effort limits. They are the same if no number is off by more than 1e-9, relative or absolute.",
@@ -476,7 +477,8 @@ def draw_leg(curves: Envelope, start: int, friction: float, *, title: str = "") 
     load.set_ylabel("load [N]")
 
     bands.draw(slope, "rated_friction", "rated friction mu_e", STYLES[0])
-    bands.draw(slope, "friction_used", "friction used", STYLES[1])
+    bands.draw(slope, "rated_friction_full", "rated friction mu_e,xy", STYLES[1])
+    bands.draw(slope, "friction_used", "friction used", STYLES[2])
     slope.axhline(friction, color="black", linewidth=0.8, label="the ground's friction")
     slope.set_ylabel("friction")
 

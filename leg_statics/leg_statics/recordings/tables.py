@@ -43,7 +43,8 @@ class Column(NamedTuple):
 PLAIN = (
     Column("condition_number", "1", "condition number of the foot Jacobian"),
     Column("load_capacity", "N", "greatest vertical ground reaction on the ground given"),
-    Column("rated_friction", "1", "mu_e, the friction that the ground must offer"),
+    Column("rated_friction", "1", "mu_e, the friction that the ground must offer, forward"),
+    Column("rated_friction_full", "1", "mu_e,xy, the same with both horizontal components"),
     Column("utilisation", "1", "share of its effort limit that the worst joint uses"),
     Column("range_use", "1", "share of its range, from the middle, that the worst joint uses"),
     Column("passive_range_use", "1", "share of its excursion that the worst passive joint uses"),
