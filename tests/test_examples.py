@@ -151,9 +151,7 @@ def test_every_foothold_carries_its_load_from_touchdown_to_lift_off(walk, hexapo
             bodies = np.array([step["body_start"], step["body_end"]])
             places = leg.mount.to_leg(np.array(foot["position"]) - bodies)
             load = walk.plan["required_load"]
-            found = evaluate_footholds(
-                leg.mechanism, leg.effort_limits, places, Contact(friction, load=load)
-            )
+            found = evaluate_footholds(leg, places, Contact(friction, load=load))
             assert found.feasible.all(), (foot, found.verdict)
             assert (found.rated_friction <= friction).all()
             assert foot["load"] <= load + 1e-6

@@ -50,14 +50,12 @@ def many_points(suite):
 
 
 def whole_map(leg, resolution, **options):
-    return list(volume_map(leg.mechanism, resolution, effort_limits=leg.effort_limits, **options))[
-        -1
-    ]
+    return list(volume_map(leg, resolution, **options))[-1]
 
 
 def points_inside(index_map):
     """Return the points of a map within the workspace and their values."""
-    z, y, x = np.meshgrid(index_map.z, index_map.y, index_map.x, indexing="ij")
+    z, y, x = np.meshgrid(index_map.height, index_map.y, index_map.x, indexing="ij")
     inside = index_map.status == Status.OK
     return np.stack([x, y, z], axis=-1)[inside], index_map.values[inside]
 
@@ -75,20 +73,15 @@ def last_message(message_type, topic):
 
 def test_a_plane_equals_the_library(suite, hexapod):
     leg = hexapod.legs[LEG]
-    wanted = plane_map(
-        leg.mechanism,
-        -0.65,
-        COARSE,
-        effort_limits=leg.effort_limits,
-        contact=Contact(0.6, SLOPE),
-    )
+    wanted = plane_map(leg, -0.65, COARSE, contact=Contact(0.6, SLOPE))
     answer = suite.client.index_map(LEG, -0.65, COARSE, ground=Ground("wood", SLOPE))
     assert answer.layers == wanted.layers == supported_layers(leg.mechanism)
-    assert len(answer.units) == len(answer.symbols) == len(answer.layers)
+    assert (answer.symbols, answer.units) == (wanted.symbols, wanted.units)
+    assert answer.height == wanted.height == -0.65
     np.testing.assert_allclose(answer.x, wanted.x, atol=1e-12)
     np.testing.assert_allclose(answer.y, wanted.y, atol=1e-12)
-    np.testing.assert_allclose(answer.values, wanted.values[0], rtol=1e-9)
-    np.testing.assert_array_equal(answer.status, wanted.status[0])
+    np.testing.assert_allclose(answer.values, wanted.values, rtol=1e-9)
+    np.testing.assert_array_equal(answer.status, wanted.status)
     assert np.isnan(answer.values[answer.status != Status.OK]).all()
     assert np.isfinite(answer.layer("load_capacity")).any()
 
@@ -217,15 +210,15 @@ def planes_of(hexapod, resolution):
 
 def test_progress_tells_the_best_so_far(gated, hexapod):
     leg = hexapod.legs[LEG]
-    *_, whole = volume_map(leg.mechanism, COARSE, layers=["rated_friction"])
-    planes = len(whole.z) // 2
+    *_, whole = volume_map(leg, COARSE, layers=["rated_friction"])
+    planes = len(whole.height) // 2
     work, progress = gated.order(COARSE)
     gated.let(planes)
-    wait_for(lambda: progress[-1].fraction == planes / len(whole.z))
+    wait_for(lambda: progress[-1].fraction == planes / len(whole.height))
     assert progress[-1].layers == ("rated_friction",)
     assert progress[-1].best[0] == np.nanmin(whole.values[:planes])
     assert progress[-1].remaining > 0.0
-    gated.let(len(whole.z) - planes)
+    gated.let(len(whole.height) - planes)
     assert work.wait().fraction == 1.0
 
 

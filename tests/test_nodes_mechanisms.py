@@ -188,7 +188,7 @@ def test_footholds_equal_the_library_or_are_not_supported(zoo, name):
                 ask()
         return
     answer = zoo.client.query_footholds(name, foot, 0.4, 20.0)
-    expected = evaluate_footholds(leg.mechanism, leg.effort_limits, foot, Contact(0.4, load=20.0))
+    expected = evaluate_footholds(leg, foot, Contact(0.4, load=20.0))
     np.testing.assert_array_equal(answer.verdict, expected.verdict)
     np.testing.assert_allclose(answer.load_capacity, expected.load_capacity, rtol=1e-9)
     if len(leg.joint_names) == 1:  # a one-crank leg may bear any load by its structure alone
@@ -212,5 +212,5 @@ def test_step_length_equals_the_library(zoo, name):
         return
     height = float(np.median(postures(leg).foot_position[:, 2]))
     answer = zoo.client.query_step_length(name, height, 0.4, 5.0)
-    step = longest_step(leg.mechanism, leg.effort_limits, height, Contact(0.4, load=5.0))
+    step = longest_step(leg, height, Contact(0.4, load=5.0))
     np.testing.assert_allclose(answer.lengths[0], step.length, atol=1e-9)

@@ -199,9 +199,7 @@ def test_recorded_answers_equal_direct_calls_of_the_library(recorded):
     (told,) = (e for e in events if e.response and e.info.sequence_number == number)
     request, response = asked.request[0], told.response[0]
     contact = Contact(0.6, SLOPE, 200.0)
-    wanted = evaluate_footholds(
-        leg.mechanism, leg.effort_limits, request.positions.reshape(-1, 3), contact
-    )
+    wanted = evaluate_footholds(leg, request.positions.reshape(-1, 3), contact)
     np.testing.assert_array_equal(response.verdict, wanted.verdict)
     np.testing.assert_allclose(response.load_capacity, wanted.load_capacity, rtol=1e-12)
     np.testing.assert_allclose(response.joint_efforts, wanted.joint_efforts.ravel(), rtol=1e-12)

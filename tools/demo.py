@@ -243,8 +243,8 @@ def draw_maps(client: LegClient, output: Path) -> None:
 
     def plane(height: float, layer: str, ground: str) -> IndexMap:
         answer = client.index_map("right_front", height, MAP_RESOLUTION, [layer], ground)
-        z, values, status = np.array([answer.height]), answer.values[None], answer.status[None]
-        return IndexMap(answer.x, answer.y, z, answer.layers, values, status)
+        z = np.array(answer.height)
+        return IndexMap(answer.x, answer.y, z, answer.layers, answer.values, answer.status)
 
     middle = MAP_HEIGHTS[len(MAP_HEIGHTS) // 2]
     capacity = {ground: plane(middle, CAPACITY_LAYER, ground) for ground in GROUNDS}

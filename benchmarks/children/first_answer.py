@@ -16,7 +16,7 @@ leg = load_robot("hexapod").legs["right_front"]
 mechanism = leg.mechanism
 foot = mechanism.initial_posture.foot_position
 contact = leg_statics.footholds.Contact(friction=0.4, load=300.0)
-leg_statics.footholds.evaluate_footholds(mechanism, leg.effort_limits, foot, contact)
+leg_statics.footholds.evaluate_footholds(leg, foot, contact)
 leg_statics.indices.evaluate_indices(mechanism, mechanism.inverse(foot))
 
 ANSWERED = time.perf_counter()

@@ -25,14 +25,14 @@ def main() -> None:
     count, chunk = map(int, sys.argv[1:3])
     leg = hexapod_leg()
     few = reachable_positions(leg.mechanism)
-    evaluate_footholds(leg.mechanism, leg.effort_limits, few, CONTACT)
+    evaluate_footholds(leg, few, CONTACT)
     CLEAR_PEAK.write_text("5")
     before = resident("VmRSS")
     capacities = np.empty(count)
     for start in range(0, count, chunk):
         size = min(chunk, count - start)
         feet = np.resize(few, (size, 3)) if size > BATCH else few[:size]
-        found = evaluate_footholds(leg.mechanism, leg.effort_limits, feet, CONTACT)
+        found = evaluate_footholds(leg, feet, CONTACT)
         capacities[start : start + size] = found.load_capacity
     print(resident("VmHWM") - before)
 

@@ -11,8 +11,8 @@ from peers.pinocchio_leg import PinocchioLeg
 from peers.solvers import Clarabel
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, neighbours, reachable_positions
 
-from leg_kinematics import Mechanism
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.robot import Leg
 from leg_statics.footholds import evaluate_footholds
 
 THREADS = 2
@@ -23,11 +23,11 @@ def rows(settings: Settings) -> Iterator[Row]:
     leg = hexapod_leg()
     mechanism = leg.mechanism
     feet = reachable_positions(mechanism)
-    mirrored = hexapod_leg("left_front").mechanism
-    mirrored_feet = reachable_positions(mirrored)
+    mirrored = hexapod_leg("left_front")
+    mirrored_feet = reachable_positions(mirrored.mechanism)
 
-    def evaluate(part: FloatArray, of: Mechanism = mechanism) -> object:
-        return evaluate_footholds(of, leg.effort_limits, part, CONTACT)
+    def evaluate(part: FloatArray, of: Leg = leg) -> object:
+        return evaluate_footholds(of, part, CONTACT)
 
     ours = measure(lambda: evaluate(feet), settings, BATCH)
     yield timed_row("evaluate_footholds", ours, Goal(350e-9), f"batch of {BATCH:,}")
@@ -50,7 +50,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     tasks = list(zip(few, starts, strict=True))
     settings.show("checking pinocchio + clarabel")
     found = np.array([peer.evaluate(*task) for task in tasks])
-    wanted = evaluate_footholds(mechanism, leg.effort_limits, few, CONTACT)
+    wanted = evaluate_footholds(leg, few, CONTACT)
     np.testing.assert_allclose(found[:, 0], wanted.load_capacity, rtol=1e-6)
     np.testing.assert_allclose(found[:, 1], wanted.rated_friction, rtol=1e-6, atol=1e-9)
     times = measure_beside(

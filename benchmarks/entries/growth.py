@@ -35,7 +35,7 @@ def rows(settings: Settings) -> Iterator[Row]:
             ("load_capacity", lambda j=jacobian: load_capacity(j, lower, upper, FRICTION)),
             (
                 "evaluate_footholds",
-                lambda feet=feet: evaluate_footholds(mechanism, leg.effort_limits, feet, CONTACT),
+                lambda feet=feet: evaluate_footholds(leg, feet, CONTACT),
             ),
         ):
             timing = measure(function, settings, count)

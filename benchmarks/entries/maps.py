@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from harness import Goal, Row, Settings, Timing, measure, timed_row
@@ -27,10 +26,9 @@ def rows(settings: Settings) -> Iterator[Row]:
     shape = grid_shape(mechanism, resolution)
     count = int(np.prod(shape))
     layers = supported_layers(mechanism)
-    options: dict[str, Any] = {"effort_limits": leg.effort_limits, "contact": CONTACT}
 
     def whole(names: Sequence[str], spacing: float = resolution, threads: int = 1) -> None:
-        for _ in volume_map(mechanism, spacing, layers=names, threads=threads, **options):
+        for _ in volume_map(leg, spacing, layers=names, threads=threads, contact=CONTACT):
             pass
 
     def timed(names: Sequence[str], threads: int = 1) -> Timing:

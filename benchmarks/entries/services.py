@@ -138,7 +138,7 @@ def parts_of_footholds(
     yield from percentiles(f"query_footholds, {BATCH:,} points", durations, Goal(10e-3))
 
     def evaluate() -> Any:
-        found = evaluate_footholds(leg.mechanism, leg.effort_limits, feet, CONTACT)
+        found = evaluate_footholds(leg, feet, CONTACT)
         return found, found.ranking
 
     mathematics = measure(evaluate, settings)

@@ -21,19 +21,19 @@ def rows(settings: Settings) -> Iterator[Row]:
     posture = mechanism.inverse(foot)
     jacobian = mechanism.jacobian(posture)
     lower, upper = leg.effort_limits.T
-    mirrored = hexapod_leg("left_front").mechanism
-    mirrored_foot = reachable_positions(mirrored)[0]
+    mirrored = hexapod_leg("left_front")
+    mirrored_foot = reachable_positions(mirrored.mechanism)[0]
     for name, function, goal in (
         ("inverse", lambda: mechanism.inverse(foot), GOAL),
         ("load_capacity", lambda: load_capacity(jacobian, lower, upper, FRICTION), GOAL),
         (
             "evaluate_footholds",
-            lambda: evaluate_footholds(mechanism, leg.effort_limits, foot, CONTACT),
+            lambda: evaluate_footholds(leg, foot, CONTACT),
             GOAL,
         ),
         (
             "evaluate_footholds, mirrored leg",
-            lambda: evaluate_footholds(mirrored, leg.effort_limits, mirrored_foot, CONTACT),
+            lambda: evaluate_footholds(mirrored, mirrored_foot, CONTACT),
             None,
         ),
         ("inverse_with_twist", lambda: mechanism.inverse_with_twist(foot), None),

@@ -15,7 +15,8 @@ from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_
 from leg_kinematics.kernels.kernel import inlined
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.vectors import inner, unit
-from leg_kinematics.mechanism import Mechanism, Posture
+from leg_kinematics.mechanism import Posture
+from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.capacity.problem import (
     ANY_MOMENT,
@@ -181,17 +182,14 @@ class Footholds(NamedTuple):
         return feasible[order]
 
 
-def evaluate_footholds(
-    mechanism: Mechanism, effort_limits: ArrayLike, foot_position: ArrayLike, contact: Contact
-) -> Footholds:
+def evaluate_footholds(leg: Leg, foot_position: ArrayLike, contact: Contact) -> Footholds:
     """Evaluate foothold candidates.
 
     A candidate is feasible if the posture is OK and every load from zero, when the foot touches
     down, to the required one can be held within the effort limits and the friction cone.
 
     Args:
-        mechanism: The leg's mechanism; its foot must be a point in space.
-        effort_limits: Lower (≤ 0) and upper (≥ 0) effort of each actuator (n, 2) [N.m or N].
+        leg: The leg; its foot must be a point in space.
         foot_position: Candidates in the leg frame (..., 3) [m].
         contact: Ground, required load and moment.
 
@@ -200,35 +198,27 @@ def evaluate_footholds(
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
-    posture, twist = mechanism.inverse_with_twist(foot_position)
-    return _judged(mechanism, posture, twist, effort_limits, contact)
+    posture, twist_jacobian = leg.mechanism.inverse_with_twist(foot_position)
+    return _judged(leg, posture, twist_jacobian, contact)
 
 
-def judge_footholds(
-    kinematics: Kinematics, effort_limits: ArrayLike, contact: Contact
-) -> Footholds:
-    """Evaluate solved postures as footholds; see `evaluate_footholds`."""
-    twist = kinematics.twist_jacobian
-    return _judged(kinematics.mechanism, kinematics.posture, twist, effort_limits, contact)
+def judge_footholds(leg: Leg, kinematics: Kinematics, contact: Contact) -> Footholds:
+    """Evaluate solved postures of a leg as footholds; see `evaluate_footholds`."""
+    return _judged(leg, kinematics.posture, kinematics.twist_jacobian, contact)
 
 
-def _judged(
-    mechanism: Mechanism,
-    posture: Posture,
-    twist_jacobian: FloatArray,
-    effort_limits: ArrayLike,
-    contact: Contact,
-) -> Footholds:
-    height, n = twist_jacobian.shape[-2:]
-    if height != 6:
+def _judged(leg: Leg, posture: Posture, twist_jacobian: FloatArray, contact: Contact) -> Footholds:
+    mechanism = leg.mechanism
+    rows, n = twist_jacobian.shape[-2:]
+    if rows != 6:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has task coordinates "
             f"{', '.join(mechanism.task_coordinates)}: load capacity needs a point foot x, y, z"
         )
-    limits = as_array("effort_limits", effort_limits, n, 2)
-    rows = contact_rows(contact, n)
+    limits = as_array("effort_limits", leg.effort_limits, n, 2)
+    given = contact_rows(contact, n)
     try:
-        verdict, numbers = _footholds(limits, twist_jacobian, posture.status, rows)
+        verdict, numbers = _footholds(limits, twist_jacobian, posture.status, given)
     except ValueError:
         shapes = {"candidates": np.shape(posture.status), **leading_shapes(contact, n)}
         raise broadcast_error(shapes) from None

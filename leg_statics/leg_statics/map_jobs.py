@@ -13,6 +13,7 @@ import numpy as np
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.robot import Leg
 from leg_statics.footholds import Contact
 from leg_statics.maps import IndexMap, best_points, find_layer, plane_map, volume_map
 
@@ -41,23 +42,22 @@ class MapKey(NamedTuple):
     @classmethod
     def of(
         cls,
-        mechanism: Mechanism,
+        leg: Leg,
         height: float | None,
         resolution: float,
         layers: tuple[str, ...],
-        effort_limits: FloatArray,
         contact: Contact,
     ) -> MapKey:
         """Return the key of a map; see the attributes for the arguments."""
-        limits = tuple(map(float, np.ravel(effort_limits)))
+        limits = tuple(map(float, np.ravel(leg.effort_limits)))
         normal = tuple(map(float, np.ravel(contact.normal)))
         friction = float(np.asarray(contact.friction))
-        return cls(mechanism, height, resolution, layers, limits, friction, normal)
+        return cls(leg.mechanism, height, resolution, layers, limits, friction, normal)
 
     @property
-    def limits(self) -> FloatArray:
-        """The effort limits (n, 2)."""
-        return np.reshape(self.effort_limits, (-1, 2))
+    def leg(self) -> Leg:
+        """The leg, by itself."""
+        return Leg.of(self.mechanism, np.reshape(self.effort_limits, (-1, 2)))
 
     @property
     def contact(self) -> Contact:
@@ -104,11 +104,10 @@ class MapMemory:
         found = self.find(key)
         if found is None:
             found = plane_map(
-                key.mechanism,
+                key.leg,
                 float("nan") if key.height is None else key.height,
                 key.resolution,
                 layers=key.layers,
-                effort_limits=key.limits,
                 contact=key.contact,
             )
             self.keep(key, found)
@@ -199,23 +198,17 @@ class MapJob:
             self.index_map = known
             self._note(1.0, *best_points(known))
             return
-        maps = volume_map(
-            key.mechanism,
-            key.resolution,
-            layers=key.layers,
-            effort_limits=key.limits,
-            contact=key.contact,
-        )
+        maps = volume_map(key.leg, key.resolution, layers=key.layers, contact=key.contact)
         best: FloatArray = np.empty(0)
         where: FloatArray = np.empty((0, 3))
         for k, self.index_map in enumerate(maps):
             plane = self.index_map._replace(
-                z=self.index_map.z[k : k + 1],
-                values=self.index_map.values[k : k + 1],
-                status=self.index_map.status[k : k + 1],
+                height=self.index_map.height[k],
+                values=self.index_map.values[k],
+                status=self.index_map.status[k],
             )
             best, where = _better(plane.layers, (best, where), best_points(plane))
-            self._note((k + 1) / len(self.index_map.z), best, where)
+            self._note((k + 1) / len(self.index_map.height), best, where)
             if self._cancelled.is_set():
                 return
         if self.index_map is not None:

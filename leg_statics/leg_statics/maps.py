@@ -7,11 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.errors import NotSupportedError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism, Posture
+from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, judge_footholds
 from leg_statics.indices import find_index, indices_of, supported_indices
@@ -29,21 +29,31 @@ class IndexMap(NamedTuple):
     Attributes:
         x: Grid coordinates along x (nx,) [m].
         y: Grid coordinates along y (ny,) [m].
-        z: Grid coordinates along z (nz,) [m]; one for a plane.
+        height: z of the grid (...,) [m]: that of a plane, (nz,) of a volume.
         layers: Names of the layers (K).
-        values: Values (nz, ny, nx, K); NaN outside the workspace.
-        status: `Status` of each point (nz, ny, nx).
+        values: Values (..., ny, nx, K); NaN outside the workspace.
+        status: `Status` of each point (..., ny, nx).
     """
 
     x: FloatArray
     y: FloatArray
-    z: FloatArray
+    height: FloatArray
     layers: tuple[str, ...]
     values: FloatArray
     status: StatusArray
 
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The literature's symbols of the layers (K)."""
+        return tuple(find_layer(name).symbol for name in self.layers)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """SI units of the layers (K)."""
+        return tuple(find_layer(name).unit for name in self.layers)
+
     def layer(self, name: str) -> FloatArray:
-        """Return the values of one layer (nz, ny, nx)."""
+        """Return the values of one layer (..., ny, nx)."""
         if name not in self.layers:
             raise UnknownNameError("layer", name, self.layers)
         return self.values[..., self.layers.index(name)]
@@ -101,30 +111,29 @@ def best_points(index_map: IndexMap) -> tuple[FloatArray, FloatArray]:
     costs = np.where(np.isnan(values), np.inf, values * signs)
     found = np.any(~np.isnan(values), axis=0)
     where = np.argmin(costs, axis=0)
-    z, y, x = np.unravel_index(where, index_map.status.shape)
-    positions = np.stack([index_map.x[x], index_map.y[y], index_map.z[z]], axis=-1)
+    *plane, y, x = np.unravel_index(where, index_map.status.shape)
+    height = np.broadcast_to(index_map.height[tuple(plane)], count)
+    positions = np.stack([index_map.x[x], index_map.y[y], height], axis=-1)
     best = values[where, np.arange(count)]
     positions[~found] = np.nan
     return np.where(found, best, np.nan), positions
 
 
 def plane_map(
-    mechanism: Mechanism,
+    leg: Leg,
     height: float,
     resolution: float,
     *,
     layers: Sequence[str] = (),
-    effort_limits: ArrayLike | None = None,
     contact: Contact | None = None,
 ) -> IndexMap:
     """Map the layers over the plane z = height.
 
     Args:
-        mechanism: The leg's mechanism.
+        leg: The leg; its foot must be a point in space.
         height: z of the plane in the leg frame [m].
         resolution: Grid spacing [m].
         layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
-        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
         contact: Ground for the layer "load_capacity".
 
     Raises:
@@ -133,31 +142,29 @@ def plane_map(
     """
     if not np.isfinite(height):
         raise ValueRangeError(f"height must be finite, got {height}")
-    names = _layers(mechanism, layers, effort_limits, contact)
-    x, y = _axes(mechanism, resolution, 2)
-    values, status = _slice(mechanism, x, y, float(height), names, effort_limits, contact)
-    return IndexMap(x, y, np.array([height]), names, values[None], status[None])
+    names = _layers(leg.mechanism, layers, contact)
+    x, y = _axes(leg.mechanism, resolution, 2)
+    values, status = _slice(leg, x, y, float(height), names, contact)
+    return IndexMap(x, y, np.array(height), names, values, status)
 
 
 def line_map(
-    mechanism: Mechanism,
+    leg: Leg,
     y: float,
     height: float,
     resolution: float,
     *,
     layers: Sequence[str] = (),
-    effort_limits: ArrayLike | None = None,
     contact: Contact | None = None,
 ) -> IndexMap:
     """Map the layers along the line at y and z = height, which runs in the walking direction.
 
     Args:
-        mechanism: The leg's mechanism.
+        leg: The leg; its foot must be a point in space.
         y: y of the line in the leg frame [m].
         height: z of the line in the leg frame [m].
         resolution: Grid spacing [m].
         layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
-        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
         contact: Ground for the layer "load_capacity".
 
     Raises:
@@ -166,29 +173,27 @@ def line_map(
     """
     if not np.isfinite([y, height]).all():
         raise ValueRangeError(f"y and height must be finite, got {y} and {height}")
-    names = _layers(mechanism, layers, effort_limits, contact)
+    names = _layers(leg.mechanism, layers, contact)
     line = np.array([float(y)])
-    x, _ = _axes(mechanism, resolution, 2)
-    values, status = _slice(mechanism, x, line, float(height), names, effort_limits, contact)
-    return IndexMap(x, line, np.array([height]), names, values[None], status[None])
+    x, _ = _axes(leg.mechanism, resolution, 2)
+    values, status = _slice(leg, x, line, float(height), names, contact)
+    return IndexMap(x, line, np.array(height), names, values, status)
 
 
 def volume_map(
-    mechanism: Mechanism,
+    leg: Leg,
     resolution: float,
     *,
     layers: Sequence[str] = (),
-    effort_limits: ArrayLike | None = None,
     contact: Contact | None = None,
     threads: int = 1,
 ) -> Iterator[IndexMap]:
     """Map the layers over the whole workspace, one plane after the other.
 
     Args:
-        mechanism: The leg's mechanism.
+        leg: The leg; its foot must be a point in space.
         resolution: Grid spacing [m].
         layers: Names of indices, or "load_capacity"; none for all that the mechanism has.
-        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
         contact: Ground for the layer "load_capacity".
         threads: Planes that are computed at the same time.
 
@@ -200,15 +205,15 @@ def volume_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If the resolution is out of range, or the map would be too large.
     """
-    names = _layers(mechanism, layers, effort_limits, contact)
-    x, y, z = _axes(mechanism, resolution, 3)
+    names = _layers(leg.mechanism, layers, contact)
+    x, y, z = _axes(leg.mechanism, resolution, 3)
     shape = (len(z), len(y), len(x))
     values = np.full((*shape, len(names)), np.nan)
     status = np.full(shape, Status.UNREACHABLE, dtype=np.uint8)
     result = IndexMap(x, y, z, names, values, status)
 
     def compute(height: float) -> tuple[FloatArray, StatusArray]:
-        return _slice(mechanism, x, y, height, names, effort_limits, contact)
+        return _slice(leg, x, y, height, names, contact)
 
     pool = ThreadPoolExecutor(threads)
     try:
@@ -246,7 +251,6 @@ def _grid_range(mechanism: Mechanism, resolution: float) -> tuple[FloatArray, Fl
 def _layers(
     mechanism: Mechanism,
     layers: Sequence[str],
-    effort_limits: ArrayLike | None,
     contact: Contact | None,
 ) -> tuple[str, ...]:
     """Return the layers asked for, or all that can be computed from what is given."""
@@ -255,57 +259,53 @@ def _layers(
             f"mechanism {mechanism.name!r} has {len(mechanism.task_coordinates)} task "
             "coordinates: index maps need a point foot x, y, z"
         )
-    with_capacity = effort_limits is not None and contact is not None
     if not layers:
-        return supported_layers(mechanism) if with_capacity else supported_indices(mechanism)
+        return supported_layers(mechanism) if contact else supported_indices(mechanism)
     for name in layers:
         if name not in supported_layers(mechanism):
             raise UnknownNameError("layer", name, supported_layers(mechanism))
-    if CAPACITY_LAYER in layers and not with_capacity:
-        raise ValueRangeError(f"layer {CAPACITY_LAYER!r} needs effort_limits and contact")
+    if CAPACITY_LAYER in layers and contact is None:
+        raise ValueRangeError(f"layer {CAPACITY_LAYER!r} needs a contact")
     return tuple(layers)
 
 
 def _slice(
-    mechanism: Mechanism,
+    leg: Leg,
     x: FloatArray,
     y: FloatArray,
     height: float,
     names: tuple[str, ...],
-    effort_limits: ArrayLike | None,
     contact: Contact | None,
 ) -> tuple[FloatArray, StatusArray]:
     """Return values (ny, nx, K) and status (ny, nx) of one plane."""
     y_grid, x_grid = np.meshgrid(y, x, indexing="ij")
     grid = np.stack([x_grid, y_grid, np.full_like(x_grid, height)], axis=-1)
-    posture = mechanism.inverse(grid)
+    posture = leg.mechanism.inverse(grid)
     values = np.full((*x_grid.shape, len(names)), np.nan)
     inside = posture.status == Status.OK  # most of a box about the workspace is outside of it
-    kinematics = Kinematics(mechanism, Posture(*(field[inside] for field in posture)))
-    values[inside] = layer_values(kinematics, names, effort_limits, contact)
+    solved = Posture(*(field[inside] for field in posture))
+    values[inside] = layer_values(leg, solved, names, contact)
     return values, posture.status
 
 
 def layer_values(
-    kinematics: Kinematics,
-    names: Sequence[str],
-    effort_limits: ArrayLike | None = None,
-    contact: Contact | None = None,
+    leg: Leg, posture: Posture, names: Sequence[str], contact: Contact | None = None
 ) -> FloatArray:
     """Return the values of layers (..., K); NaN where a posture's status is not OK.
 
     Args:
-        kinematics: Solved postures (...).
+        leg: The leg.
+        posture: Its solved postures (...).
         names: Names of K layers.
-        effort_limits: Limits (n, 2) for the layer "load_capacity" [N.m or N].
         contact: Ground for the layer "load_capacity".
     """
-    values = np.empty((*np.shape(kinematics.posture.status), len(names)))
+    kinematics = Kinematics(leg.mechanism, posture)
+    values = np.empty((*np.shape(posture.status), len(names)))
     indices = [name for name in names if name != CAPACITY_LAYER]
     if indices:
         columns = [name != CAPACITY_LAYER for name in names]
         values[..., columns] = indices_of(kinematics, indices)[1]
-    if CAPACITY_LAYER in names and effort_limits is not None and contact is not None:
-        footholds = judge_footholds(kinematics, effort_limits, contact)
+    if CAPACITY_LAYER in names and contact is not None:
+        footholds = judge_footholds(leg, kinematics, contact)
         values[..., names.index(CAPACITY_LAYER)] = footholds.load_capacity
     return values

@@ -68,8 +68,7 @@ class StepLength(NamedTuple):
 
 
 def longest_step(
-    mechanism: Mechanism,
-    effort_limits: ArrayLike,
+    leg: Leg,
     height: ArrayLike,
     contact: Contact,
     *,
@@ -83,8 +82,7 @@ def longest_step(
     the lateral offset, which counts to the left of the direction (y for the default direction).
 
     Args:
-        mechanism: The leg's mechanism.
-        effort_limits: Lower and upper effort of each actuator (n, 2) [N.m or N].
+        leg: The leg; its foot must be a point in space.
         height: z of the foot in the leg frame (...,) [m], negative below the hip.
         contact: Ground, required load and moment, the same for all points.
         lateral_offset: Distance of the line from the leg frame's origin (...,) [m].
@@ -108,10 +106,10 @@ def longest_step(
     def evaluate(s: FloatArray) -> tuple[NDArray[np.uint8], Footholds]:
         """Return verdict and footholds at distances s (..., m) along the lines."""
         points = origin[..., None, :] + s[..., None] * along
-        footholds = evaluate_footholds(mechanism, effort_limits, points, contact)
+        footholds = evaluate_footholds(leg, points, contact)
         return _verdicts(footholds, contact, criterion), footholds
 
-    reach = _reach(mechanism)
+    reach = _reach(leg.mechanism)
     samples = int(min(2.0 * reach / SAMPLING, LONGEST_LINE)) + 1
     s = np.linspace(-reach, reach, samples)
     feasible = evaluate(np.broadcast_to(s, (*heights.shape, samples)))[0] == Verdict.FEASIBLE
@@ -150,14 +148,20 @@ class CommonStep(NamedTuple):
     """The step that several legs of a robot can make together.
 
     Attributes:
-        length: The shortest of their steps for each height (...,) [m].
+        common_length: The shortest of their steps for each height (...,) [m].
         limiting_leg: Index of the leg that has it (...,).
         steps: The step of each leg, by name; points are in the leg frames.
     """
 
-    length: FloatArray
+    common_length: FloatArray
     limiting_leg: NDArray[np.int64]
     steps: Mapping[str, StepLength]
+
+    @property
+    def best_height(self) -> int:
+        """Flat index of the longest common step; -1 if none is longer than 0."""
+        longest = np.max(self.common_length, initial=0.0)
+        return int(np.argmax(self.common_length)) if longest > 0.0 else -1
 
 
 def common_step(
@@ -183,8 +187,7 @@ def common_step(
     for name, leg in legs.items():
         offset = lateral_offset(leg) if callable(lateral_offset) else lateral_offset
         steps[name] = longest_step(
-            leg.mechanism,
-            leg.effort_limits,
+            leg,
             -as_array("body_height", body_height) - leg.mount.position[2],
             contact._replace(
                 normal=leg.mount.vectors_to_leg(contact.normal),

@@ -22,8 +22,8 @@ def warm_up_statics(robot: Robot) -> None:
             load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
             feet = np.tile(posture.foot_position, (2, 1))
             contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
-            evaluate_footholds(leg.mechanism, leg.effort_limits, feet, contact)
-            evaluate_footholds(leg.mechanism, leg.effort_limits, feet[0], Contact(0.4))
+            evaluate_footholds(leg, feet, contact)
+            evaluate_footholds(leg, feet[0], Contact(0.4))
             utilisation(lower, leg.effort_limits)
     joints = [leg.mechanism.initial_posture.joint_positions for leg in robot.legs.values()]
     names, _ = robot.effort_limits()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawing_support import panels, texts
 
-from leg_kinematics import ParallelDrive, ShapeError
+from leg_kinematics import Leg, ParallelDrive, ShapeError
 from leg_kinematics.errors import ValueRangeError
 from leg_statics.drawing.friction import plot_rated_friction
 from leg_statics.drawing.steps import plot_step_lengths
@@ -15,7 +15,7 @@ from leg_statics.maps import line_map, plane_map
 from leg_statics.published.paper_000 import GROUNDS
 from leg_statics.step_length import Criterion
 
-LEG = ParallelDrive()
+LEG = Leg.of(ParallelDrive())
 PAPER_GROUNDS = [Ground(name, *friction) for name, friction in GROUNDS.items()]
 LAYER = ["rated_friction"]
 
@@ -24,7 +24,7 @@ def test_a_friction_curve_runs_where_the_line_is_inside_the_workspace():
     line = line_map(LEG, 0.05, -0.7, 0.01, layers=LAYER)
     ax = plot_rated_friction({"leg": line}, []).axes[0]
     (curve,) = (shown for shown in ax.lines if "$h$" in str(shown.get_label()))
-    values = line.layer("rated_friction")[0, 0]
+    values = line.layer("rated_friction")[0]
     inside = np.isfinite(values)
     np.testing.assert_array_equal(curve.get_xdata(), line.x[inside])
     np.testing.assert_array_equal(curve.get_ydata(), values[inside])

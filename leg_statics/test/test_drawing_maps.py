@@ -10,7 +10,7 @@ import pytest
 from drawing_support import meshes, panels, texts
 from matplotlib.figure import Figure
 
-from leg_kinematics import ParallelDrive, ShapeError, UnknownNameError
+from leg_kinematics import Leg, ParallelDrive, ShapeError, UnknownNameError
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.mechanisms import DoubleRhombus
 from leg_statics.drawing.maps import plot_maps
@@ -25,7 +25,7 @@ RESOLUTION = 0.02
 
 def maps(index, heights=HEIGHTS, resolution=RESOLUTION, mechanism=LEG):
     return {
-        height_title(height): plane_map(mechanism, height, resolution, layers=[index])
+        height_title(height): plane_map(Leg.of(mechanism), height, resolution, layers=[index])
         for height in heights
     }
 
@@ -68,7 +68,8 @@ def test_a_map_has_one_panel_a_height_and_one_colour_scale(index_figure):
 
 def test_a_map_is_blank_outside_the_workspace_and_shows_the_values_inside(index_figure):
     for mesh, height in zip(meshes(index_figure), HEIGHTS, strict=True):
-        truth = plane_map(LEG, height, RESOLUTION, layers=["condition_number"]).values[0, ..., 0].T
+        m = plane_map(Leg.of(LEG), height, RESOLUTION, layers=["condition_number"])
+        truth = m.layer("condition_number").T
         shown = np.ma.masked_invalid(mesh.get_array())
         assert np.array_equal(np.ma.getmaskarray(shown), np.isnan(truth))
         assert 0 < shown.count() < shown.size
@@ -88,7 +89,7 @@ def test_a_constant_index_is_said_in_words():
 
 
 def test_huge_values_at_the_rim_do_not_flatten_the_map():
-    m = plane_map(LEG, -0.7, RESOLUTION, layers=["condition_number"])
+    m = plane_map(Leg.of(LEG), -0.7, RESOLUTION, layers=["condition_number"])
     values = m.values.copy()
     values.flat[np.nanargmax(values)] = 1e6
     (mesh,) = meshes(plot_maps({"a": m._replace(values=values)}, "condition_number"))
@@ -109,8 +110,8 @@ def test_a_layer_that_the_maps_do_not_have_is_refused():
 
 
 def test_a_map_of_several_planes_is_refused():
-    m = plane_map(LEG, -0.7, 0.05, layers=["condition_number"])
-    twice = m._replace(values=np.concatenate([m.values, m.values]))
+    m = plane_map(Leg.of(LEG), -0.7, 0.05, layers=["condition_number"])
+    twice = m._replace(values=np.stack([m.values, m.values]))
     with pytest.raises(ShapeError, match="one plane"):
         plot_maps({"a": twice}, "condition_number")
 

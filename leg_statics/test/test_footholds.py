@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,15 +11,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.optimize import linprog
 
-from leg_kinematics import ParallelDrive, ShapeError, Status, ValueRangeError
+from leg_kinematics import Leg, ParallelDrive, ShapeError, Status, ValueRangeError
 from leg_kinematics.mirrored import Mirrored
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import joint_efforts
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.published.paper_000 import legs
 
-LEG = legs()["optimised"]
 LIMITS = np.array([[-60.0, 60.0], [-60.0, 60.0], [-80.0, 40.0]])
+LEG = Leg.of(legs()["optimised"], LIMITS)
 CANDIDATES = np.random.default_rng(0).uniform([-0.4, -0.3, -0.8], [0.3, 0.3, -0.4], (4000, 3))
 NORMAL = np.array([0.1, -0.2, 1.0])
 BIAS = np.array([4.0, -3.0, 6.0])
@@ -36,7 +38,7 @@ every_contact = pytest.mark.parametrize("contact", CONTACTS.values(), ids=CONTAC
 
 @every_contact
 def test_a_candidate_that_is_not_solved_tells_why(contact):
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    footholds = evaluate_footholds(LEG, CANDIDATES, contact)
     unsolved = footholds.posture.status != Status.OK
     assert 0.1 < unsolved.mean() < 0.9
     np.testing.assert_array_equal(footholds.verdict[unsolved], footholds.posture.status[unsolved])
@@ -48,7 +50,7 @@ def test_a_candidate_that_is_not_solved_tells_why(contact):
 
 @every_contact
 def test_the_force_of_a_feasible_candidate_is_admissible(contact):
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    footholds = evaluate_footholds(LEG, CANDIDATES, contact)
     good = footholds.feasible
     assert good.sum() > 20
     force, posture = footholds.force[good], footholds.posture
@@ -57,12 +59,12 @@ def test_the_force_of_a_feasible_candidate_is_admissible(contact):
     np.testing.assert_allclose(pressed, contact.load, rtol=1e-9)
     sideways = np.linalg.norm(force - pressed[:, None] * normal, axis=1)
     assert np.all(sideways <= contact.friction * pressed * (1 + 1e-9))
-    expected = joint_efforts(
-        LEG.jacobian(posture)[good], LEG.angular_jacobian(posture)[good], force, contact.moment
-    ) + np.asarray(contact.bias_efforts)
+    jacobian = LEG.mechanism.jacobian(posture)[good]
+    j_omega = LEG.mechanism.angular_jacobian(posture)[good]
+    expected = joint_efforts(jacobian, j_omega, force, contact.moment)
+    expected += np.asarray(contact.bias_efforts)
     efforts = footholds.joint_efforts[good]
     np.testing.assert_allclose(efforts, expected, rtol=1e-9, atol=1e-9)
-    j_omega = LEG.angular_jacobian(posture)[good]
     reserve = contact.any_direction_moment * np.hypot(j_omega[:, 0], j_omega[:, 1])
     share = np.maximum((efforts + reserve) / LIMITS[:, 1], (efforts - reserve) / LIMITS[:, 0])
     np.testing.assert_allclose(footholds.utilisation[good], share.max(axis=1), rtol=1e-9)
@@ -73,10 +75,10 @@ def test_the_force_of_a_feasible_candidate_is_admissible(contact):
 @every_contact
 def test_a_verdict_of_friction_or_effort_is_confirmed_by_a_linear_programme(contact):
     """Without the cone the question is linear: highs must find the load, or not, likewise."""
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    footholds = evaluate_footholds(LEG, CANDIDATES, contact)
     normal = np.asarray(contact.normal) / np.linalg.norm(contact.normal)
     posture = footholds.posture
-    jacobian, j_omega = LEG.jacobian(posture), LEG.angular_jacobian(posture)
+    jacobian, j_omega = LEG.mechanism.jacobian(posture), LEG.mechanism.angular_jacobian(posture)
     for verdict in (Verdict.FRICTION, Verdict.EFFORT):
         for k in np.flatnonzero(footholds.verdict == verdict)[:40]:
             idle = joint_efforts(0 * jacobian[k], j_omega[k], np.zeros(3), contact.moment)
@@ -98,31 +100,31 @@ def test_each_verdict_occurs():
     seen = {
         int(v)
         for contact in CONTACTS.values()
-        for v in evaluate_footholds(LEG, LIMITS, CANDIDATES, contact).verdict
+        for v in evaluate_footholds(LEG, CANDIDATES, contact).verdict
     }
-    seen.add(int(evaluate_footholds(LEG, LIMITS, [np.nan, 0.0, -0.6], CONTACTS["level"]).verdict))
+    seen.add(int(evaluate_footholds(LEG, [np.nan, 0.0, -0.6], CONTACTS["level"]).verdict))
     assert seen == set(map(int, Verdict))
 
 
 def test_capacity_is_that_of_the_jacobian():
     contact = Contact(0.4, normal=NORMAL, load=10.0, bias_efforts=BIAS)
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+    footholds = evaluate_footholds(LEG, CANDIDATES, contact)
     ok = footholds.posture.status == Status.OK
     direct = load_capacity(
-        LEG.jacobian(footholds.posture), *LIMITS.T, 0.4, normal=NORMAL, bias_efforts=BIAS
+        LEG.mechanism.jacobian(footholds.posture), *LIMITS.T, 0.4, normal=NORMAL, bias_efforts=BIAS
     )
     np.testing.assert_allclose(footholds.load_capacity[ok], direct.capacity[ok], rtol=1e-12)
 
 
 def test_a_moment_of_unknown_direction_costs_at_least_as_much_as_any_known_one():
     size = 5.0
-    worst = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, any_direction_moment=size))
+    worst = evaluate_footholds(LEG, CANDIDATES, Contact(0.4, any_direction_moment=size))
     ok = worst.posture.status == Status.OK
     for angle in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
         moment = size * np.array([np.cos(angle), np.sin(angle), 0.0])
-        known = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4, moment=moment))
+        known = evaluate_footholds(LEG, CANDIDATES, Contact(0.4, moment=moment))
         assert np.all(known.load_capacity[ok] >= worst.load_capacity[ok] * (1 - 1e-9))
-    hard = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4))
+    hard = evaluate_footholds(LEG, CANDIDATES, Contact(0.4))
     assert np.all(hard.load_capacity[ok] >= worst.load_capacity[ok])
 
 
@@ -132,7 +134,7 @@ def test_a_leg_that_cannot_be_held_carries_nothing():
         Contact(0.4, any_direction_moment=1e6),
         Contact(0.4, moment=(1e6, 0.0, 0.0)),
     ):
-        footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
+        footholds = evaluate_footholds(LEG, CANDIDATES, contact)
         ok = footholds.posture.status == Status.OK
         assert np.all(footholds.verdict[ok] == Verdict.EFFORT)
         assert np.all(footholds.load_capacity[ok] == 0.0)
@@ -140,7 +142,7 @@ def test_a_leg_that_cannot_be_held_carries_nothing():
 
 
 def test_ranking_lists_feasible_candidates_by_capacity():
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"])
+    footholds = evaluate_footholds(LEG, CANDIDATES, CONTACTS["level"])
     order = footholds.ranking
     assert len(order) == footholds.feasible.sum()
     assert footholds.feasible[order].all()
@@ -150,7 +152,7 @@ def test_ranking_lists_feasible_candidates_by_capacity():
 
 
 def test_no_load_is_feasible_wherever_the_posture_is_ok():
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.0, load=0.0))
+    footholds = evaluate_footholds(LEG, CANDIDATES, Contact(0.0, load=0.0))
     ok = footholds.posture.status == Status.OK
     assert footholds.feasible[ok].all()
     np.testing.assert_array_equal(footholds.force[ok], 0.0)
@@ -158,7 +160,7 @@ def test_no_load_is_feasible_wherever_the_posture_is_ok():
 
 
 def test_friction_margin_is_what_the_ground_offers_beyond_mu_e():
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, Contact(0.4))
+    footholds = evaluate_footholds(LEG, CANDIDATES, Contact(0.4))
     ok = footholds.posture.status == Status.OK
     np.testing.assert_allclose(
         footholds.friction_margin[ok], 0.4 - footholds.rated_friction[ok], atol=1e-12
@@ -169,8 +171,9 @@ def test_friction_margin_is_what_the_ground_offers_beyond_mu_e():
 def test_a_mirrored_leg_mirrors_everything():
     contact = CONTACTS["inclined"]
     mirror = contact._replace(normal=NORMAL * [1, -1, 1])
-    a = evaluate_footholds(LEG, LIMITS, CANDIDATES, contact)
-    b = evaluate_footholds(Mirrored(LEG), LIMITS, CANDIDATES * [1, -1, 1], mirror)
+    mirrored = Leg.of(Mirrored(LEG.mechanism), LIMITS)
+    a = evaluate_footholds(LEG, CANDIDATES, contact)
+    b = evaluate_footholds(mirrored, CANDIDATES * [1, -1, 1], mirror)
     np.testing.assert_array_equal(a.verdict, b.verdict)
     np.testing.assert_allclose(a.load_capacity, b.load_capacity, rtol=1e-9)
     np.testing.assert_allclose(a.force * [1, -1, 1], b.force, rtol=1e-6, atol=1e-6)
@@ -180,11 +183,11 @@ def test_contacts_may_differ_from_candidate_to_candidate():
     friction = np.linspace(0.05, 1.0, 50)
     load = np.linspace(400.0, 10.0, 50)
     together = evaluate_footholds(
-        LEG, LIMITS, CANDIDATES[:50], Contact(friction, load=load, moment=np.tile(MOMENT, (50, 1)))
+        LEG, CANDIDATES[:50], Contact(friction, load=load, moment=np.tile(MOMENT, (50, 1)))
     )
     for k in range(50):
         one = evaluate_footholds(
-            LEG, LIMITS, CANDIDATES[k], Contact(friction[k], load=load[k], moment=MOMENT)
+            LEG, CANDIDATES[k], Contact(friction[k], load=load[k], moment=MOMENT)
         )
         assert one.verdict == together.verdict[k]
         np.testing.assert_array_equal(one.load_capacity, together.load_capacity[k])
@@ -193,23 +196,23 @@ def test_contacts_may_differ_from_candidate_to_candidate():
 def test_a_contact_whose_array_changed_is_read_anew():
     load, points = np.array(10.0), CANDIDATES[:50]
     contact = Contact(0.4, load=load)
-    evaluate_footholds(LEG, LIMITS, points, contact)
+    evaluate_footholds(LEG, points, contact)
     load[()] = 500.0
-    again = evaluate_footholds(LEG, LIMITS, points, contact)
+    again = evaluate_footholds(LEG, points, contact)
     np.testing.assert_array_equal(
-        again.verdict, evaluate_footholds(LEG, LIMITS, points, Contact(0.4, load=500.0)).verdict
+        again.verdict, evaluate_footholds(LEG, points, Contact(0.4, load=500.0)).verdict
     )
 
 
 def test_numbers_have_a_column_for_each_result():
-    footholds = evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["soft"])
+    footholds = evaluate_footholds(LEG, CANDIDATES, CONTACTS["soft"])
     results = [
         *(footholds.rated_friction, footholds.rated_friction_full, footholds.friction_margin),
         *(footholds.utilisation, footholds.limiting_joint, footholds.load_capacity),
     ]
     columns = np.column_stack([*results, footholds.force, footholds.joint_efforts])
     np.testing.assert_array_equal(footholds.numbers, columns)
-    one = evaluate_footholds(LEG, LIMITS, CANDIDATES[0], CONTACTS["soft"])
+    one = evaluate_footholds(LEG, CANDIDATES[0], CONTACTS["soft"])
     assert isinstance(one.load_capacity, float)
     assert one.limiting_joint.dtype == np.int32
 
@@ -232,7 +235,7 @@ def test_numbers_have_a_column_for_each_result():
 )
 def test_a_value_out_of_range_is_named(change, named):
     with pytest.raises(ValueRangeError, match=named):
-        evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"]._replace(**change))
+        evaluate_footholds(LEG, CANDIDATES, CONTACTS["level"]._replace(**change))
 
 
 @pytest.mark.parametrize(
@@ -247,15 +250,15 @@ def test_a_value_out_of_range_is_named(change, named):
 )
 def test_a_wrong_shape_is_named(change, named):
     with pytest.raises(ShapeError, match=named):
-        evaluate_footholds(LEG, LIMITS, CANDIDATES, CONTACTS["level"]._replace(**change))
+        evaluate_footholds(LEG, CANDIDATES, CONTACTS["level"]._replace(**change))
     with pytest.raises(ShapeError, match="foot_position"):
-        evaluate_footholds(LEG, LIMITS, [[0.0, 1.0]], CONTACTS["level"])
+        evaluate_footholds(LEG, [[0.0, 1.0]], CONTACTS["level"])
     with pytest.raises(ShapeError, match="effort_limits"):
-        evaluate_footholds(LEG, LIMITS[:2], CANDIDATES, CONTACTS["level"])
+        evaluate_footholds(replace(LEG, effort_limits=LIMITS[:2]), CANDIDATES, CONTACTS["level"])
 
 
 def test_no_candidates_give_no_answers():
-    footholds = evaluate_footholds(LEG, LIMITS, np.empty((0, 3)), CONTACTS["level"])
+    footholds = evaluate_footholds(LEG, np.empty((0, 3)), CONTACTS["level"])
     assert footholds.verdict.shape == (0,)
     assert footholds.ranking.shape == (0,)
     assert footholds.best == -1
@@ -264,7 +267,9 @@ def test_no_candidates_give_no_answers():
 @settings(max_examples=200, deadline=None)
 @given(hnp.arrays(np.float64, (6, 3), elements=st.floats()), st.floats(0.0, 10.0))
 def test_any_candidates_are_taken(points, friction):
-    footholds = evaluate_footholds(ParallelDrive(), LIMITS, points, Contact(friction, load=100.0))
+    footholds = evaluate_footholds(
+        Leg.of(ParallelDrive(), LIMITS), points, Contact(friction, load=100.0)
+    )
     good = footholds.feasible
     for values in (footholds.load_capacity, footholds.utilisation, footholds.rated_friction):
         assert np.isfinite(values[good]).all()
@@ -283,9 +288,9 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
         any_direction_moment=random.uniform(0.0, 2.0, count),
         bias_efforts=random.uniform(-3.0, 3.0, (count, 3)),
     )
-    together = evaluate_footholds(LEG, LIMITS, feet, contact)
+    together = evaluate_footholds(LEG, feet, contact)
     for k in range(count):
-        alone = evaluate_footholds(LEG, LIMITS, feet[k], Contact(*(field[k] for field in contact)))
+        alone = evaluate_footholds(LEG, feet[k], Contact(*(field[k] for field in contact)))
         for name in ("verdict", "limiting_joint"):
             assert getattr(alone, name) == getattr(together, name)[k]
         for name in ("load_capacity", "force", "joint_efforts", "utilisation", "friction_margin"):
@@ -307,4 +312,4 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
 def test_one_wrong_contact_among_many_is_told_even_where_the_foot_cannot_reach(contact):
     far = np.array([[9.0, 9.0, 9.0], [9.0, 9.0, 9.0]])
     with pytest.raises(ValueRangeError):
-        evaluate_footholds(LEG, LIMITS, far, contact)
+        evaluate_footholds(LEG, far, contact)

@@ -194,7 +194,7 @@ def test_lines_of_the_table_are_what_the_library_evaluates(study, tmp_path):
     outcome = run(cheap, tmp_path / "out", on_design=stop_after(20))
     design = outcome.front[0].design
     changes = {"drive_lever": design.parameters[0], "shank_length": design.parameters[1]}
-    wanted = evaluate_design(cheap.leg.mechanism, changes, cheap.metrics, cheap.conditions)
+    wanted = evaluate_design(cheap.leg, changes, cheap.metrics, cheap.conditions)
     np.testing.assert_array_equal(design.values, list(wanted.values.values()))
 
 

@@ -33,7 +33,7 @@ ICE_AND_WOOD = [Ground("wood", 0.6, 0.9), Ground("ice", 0.08, 0.4)]
 def test_an_index_is_mapped_at_the_heights_asked_for_from_the_lowest():
     figure = index_picture(LEG, "condition_number", [-0.70, -0.80], RESOLUTION)
     assert [ax.get_title() for ax in panels(figure)] == ["$h$ = −0.80 m", "$h$ = −0.70 m"]
-    truth = plane_map(LEG.mechanism, -0.80, RESOLUTION, layers=["condition_number"])
+    truth = plane_map(LEG, -0.80, RESOLUTION, layers=["condition_number"])
     shown = np.ma.masked_invalid(meshes(figure)[0].get_array()).compressed()
     wanted = truth.values[0, ..., 0].T
     np.testing.assert_array_equal(shown, wanted[np.isfinite(wanted)])

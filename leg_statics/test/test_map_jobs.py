@@ -7,19 +7,20 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from leg_kinematics import UnknownNameError, ValueRangeError
+from leg_kinematics import Leg, UnknownNameError, ValueRangeError
 from leg_statics.footholds import Contact
 from leg_statics.map_jobs import MapJob, MapKey, MapMemory
 from leg_statics.maps import best_points, find_layer, grid_shape, volume_map
 from leg_statics.published.paper_000 import legs
 
-LEG = legs()["optimised"]
+MECHANISM = legs()["optimised"]
 LIMITS = np.array([[-150.0, 150.0]] * 3)
+LEG = Leg.of(MECHANISM, LIMITS)
 LAYERS = ("rated_friction", "load_capacity")
 
 
 def key_of(height=None, resolution=0.05, limits=LIMITS, friction=0.4):
-    return MapKey.of(LEG, height, resolution, LAYERS, limits, Contact(friction))
+    return MapKey.of(Leg.of(MECHANISM, limits), height, resolution, LAYERS, Contact(friction))
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_the_map_not_used_for_longest_is_forgotten_first():
 def test_a_job_equals_the_whole_map(pool):
     job = finished(MapJob(key_of(), MapMemory(10**8), pool))
     job.check()
-    *_, wanted = volume_map(LEG, 0.05, layers=LAYERS, effort_limits=LIMITS, contact=Contact(0.4))
+    *_, wanted = volume_map(LEG, 0.05, layers=LAYERS, contact=Contact(0.4))
     assert job.complete
     np.testing.assert_array_equal(job.index_map.values, wanted.values)
     best, where = best_points(wanted)
@@ -99,7 +100,7 @@ def test_a_cancelled_job_ends_after_the_plane_under_way_and_is_not_remembered(po
     job.cancel()
     gate.set()
     assert not finished(job).complete
-    assert job.progress.fraction == 1 / len(job.index_map.z)
+    assert job.progress.fraction == 1 / len(job.index_map.height)
     assert memory.find(key) is None
 
 
@@ -126,8 +127,8 @@ def test_a_map_without_values_has_no_best():
 
 def test_the_shape_of_a_grid_is_known_before_it_is_computed():
     *_, whole = volume_map(LEG, 0.05, layers=LAYERS[:1])
-    assert grid_shape(LEG, 0.05) == whole.status.shape
-    assert min(grid_shape(LEG, 1e-300)) == min(grid_shape(LEG, 5e-324)) == 10**9
+    assert grid_shape(MECHANISM, 0.05) == whole.status.shape
+    assert min(grid_shape(MECHANISM, 1e-300)) == min(grid_shape(MECHANISM, 5e-324)) == 10**9
 
 
 def test_an_unknown_layer_is_refused():

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from leg_kinematics import ShapeError, ValueRangeError, load_robot
+from leg_kinematics import Leg, ShapeError, ValueRangeError, load_robot
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.grounds import load_grounds
 from leg_statics.published.paper_000 import STEP, legs
 from leg_statics.step_length import Criterion, common_step, longest_step
 
-LEGS = legs()
+LEGS = {stage: Leg.of(mechanism, (-60.0, 60.0)) for stage, mechanism in legs().items()}
 LEG = LEGS["optimised"]
-LIMITS = np.array([[-60.0, 60.0]] * 3)
 GROUNDS = load_grounds().by_name
 
 
@@ -22,7 +21,7 @@ def brute_force(direction, height, offset, contact, spacing=1e-4):
     left = np.array([-direction[1], direction[0], 0.0])
     s = np.arange(-1.0, 1.0, spacing)
     points = offset * left + np.array([0, 0, height]) + s[:, None] * np.asarray(direction)
-    feasible = evaluate_footholds(LEG, LIMITS, points, contact).feasible
+    feasible = evaluate_footholds(LEG, points, contact).feasible
     edges = np.flatnonzero(np.diff(np.concatenate([[0], feasible.astype(int), [0]])))
     starts, ends = edges[::2], edges[1::2]
     if not len(starts):
@@ -40,7 +39,7 @@ def brute_force(direction, height, offset, contact, spacing=1e-4):
 @pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.6, 0.8, 0.0), (1.0, 0.0, 0.0)])
 def test_the_step_equals_brute_force(height, offset, direction):
     contact = Contact(0.3, load=180.0)
-    step = longest_step(LEG, LIMITS, height, contact, lateral_offset=offset, direction=direction)
+    step = longest_step(LEG, height, contact, lateral_offset=offset, direction=direction)
     length, start, end = brute_force(direction, height, offset, contact)
     assert step.length == pytest.approx(length, abs=2e-4)
     if length:
@@ -51,7 +50,7 @@ def test_the_step_equals_brute_force(height, offset, direction):
 def test_the_ends_are_feasible_and_a_tenth_of_a_millimetre_further_they_are_not():
     heights = np.linspace(-0.72, -0.45, 10)
     contact = Contact(0.3, load=180.0)
-    step = longest_step(LEG, LIMITS, heights, contact)
+    step = longest_step(LEG, heights, contact)
     found = step.length > 0.0
     assert found.sum() > 5
     ahead = np.array([1e-4, 0.0, 0.0])
@@ -59,15 +58,15 @@ def test_the_ends_are_feasible_and_a_tenth_of_a_millimetre_further_they_are_not(
         (step.start, -ahead, step.start_limit),
         (step.end, ahead, step.end_limit),
     ):
-        inside = evaluate_footholds(LEG, LIMITS, ends[found], contact)
-        outside = evaluate_footholds(LEG, LIMITS, (ends + outward)[found], contact)
+        inside = evaluate_footholds(LEG, ends[found], contact)
+        outside = evaluate_footholds(LEG, (ends + outward)[found], contact)
         assert inside.feasible.all()
         np.testing.assert_array_equal(outside.verdict, limits[found])
         assert not outside.feasible.any()
 
 
 def test_every_point_of_the_profile_carries_the_load():
-    step = longest_step(LEG, LIMITS, [-0.65, -0.55], Contact(0.3, load=180.0))
+    step = longest_step(LEG, [-0.65, -0.55], Contact(0.3, load=180.0))
     assert step.positions.shape == (2, 21, 3)
     assert np.all(step.load_capacity >= 180.0)
     np.testing.assert_allclose(step.positions[:, 0], step.start)
@@ -81,7 +80,7 @@ def test_the_smoother_the_ground_the_shorter_the_step(stage, criterion):
     heights = np.linspace(-0.85, -0.5, 15)
     load = 250.0 if criterion == Criterion.CAPACITY else 0.0
     steps = [
-        longest_step(LEGS[stage], LIMITS, heights, Contact(mu, load=load), criterion=criterion)
+        longest_step(LEGS[stage], heights, Contact(mu, load=load), criterion=criterion)
         for mu in (0.05, 0.08, 0.2, 0.4, 0.6, 0.9)
     ]
     lengths = np.stack([step.length for step in steps])
@@ -94,16 +93,16 @@ def test_the_smoother_the_ground_the_shorter_the_step(stage, criterion):
 def test_a_step_of_300_mm_fits_on_cement_before_and_after_the_optimisation(stage):
     heights = np.linspace(-0.9, -0.45, 19)
     contact = Contact(GROUNDS["cement"].friction_low)
-    step = longest_step(LEGS[stage], LIMITS, heights, contact, criterion=Criterion.RATED_FRICTION)
+    step = longest_step(LEGS[stage], heights, contact, criterion=Criterion.RATED_FRICTION)
     assert step.length.max() > STEP
     ice = Contact(GROUNDS["ice"].friction_low)
-    on_ice = longest_step(LEGS[stage], LIMITS, heights, ice, criterion=Criterion.RATED_FRICTION)
+    on_ice = longest_step(LEGS[stage], heights, ice, criterion=Criterion.RATED_FRICTION)
     assert on_ice.length.max() < STEP  # what fits on ice at its smoothest is shorter
 
 
 def test_the_papers_criterion_asks_for_mu_e_along_the_whole_stance():
     contact = Contact(0.25)
-    step = longest_step(LEG, LIMITS, -0.62, contact, criterion=Criterion.RATED_FRICTION)
+    step = longest_step(LEG, -0.62, contact, criterion=Criterion.RATED_FRICTION)
     assert np.nanmax(step.rated_friction) <= 0.25 + 1e-5
     assert Verdict.FRICTION in (step.start_limit, step.end_limit)
 
@@ -111,10 +110,10 @@ def test_the_papers_criterion_asks_for_mu_e_along_the_whole_stance():
 def test_heights_are_a_batch():
     heights = np.array([[-0.7, -0.65], [-0.55, 0.5]])
     contact = Contact(0.3, load=150.0)
-    together = longest_step(LEG, LIMITS, heights, contact)
+    together = longest_step(LEG, heights, contact)
     assert together.length.shape == (2, 2)
     for index in np.ndindex(2, 2):
-        one = longest_step(LEG, LIMITS, heights[index], contact)
+        one = longest_step(LEG, heights[index], contact)
         assert one.length == pytest.approx(together.length[index], abs=1e-9)
     assert together.length[1, 1] == 0.0
     assert np.isnan(together.start[1, 1]).all()
@@ -122,8 +121,8 @@ def test_heights_are_a_batch():
 
 def test_walking_backwards_swaps_the_ends():
     contact = Contact(0.3, load=150.0)
-    there = longest_step(LEG, LIMITS, -0.6, contact)
-    back = longest_step(LEG, LIMITS, -0.6, contact, direction=(-2.0, 0.0, 0.0))
+    there = longest_step(LEG, -0.6, contact)
+    back = longest_step(LEG, -0.6, contact, direction=(-2.0, 0.0, 0.0))
     np.testing.assert_allclose(there.start, back.end, atol=3e-6)
     assert there.length == pytest.approx(back.length, abs=5e-6)
 
@@ -161,8 +160,8 @@ def test_the_common_step_is_the_shortest():
 )
 def test_bad_arguments_are_named(arguments, named):
     with pytest.raises(ValueRangeError, match=named):
-        longest_step(LEG, LIMITS, -0.6, Contact(0.4), **arguments)
+        longest_step(LEG, -0.6, Contact(0.4), **arguments)
     with pytest.raises(ValueRangeError, match="height"):
-        longest_step(LEG, LIMITS, np.nan, Contact(0.4))
+        longest_step(LEG, np.nan, Contact(0.4))
     with pytest.raises(ShapeError, match="direction"):
-        longest_step(LEG, LIMITS, -0.6, Contact(0.4), direction=(0.0, 1.0))
+        longest_step(LEG, -0.6, Contact(0.4), direction=(0.0, 1.0))

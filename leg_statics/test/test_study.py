@@ -62,7 +62,6 @@ def test_conditions_come_from_ground_and_leg_type(load):
     assert conditions.friction == 0.4
     assert conditions.load == 300.0
     assert conditions.criterion == Criterion.RATED_FRICTION
-    assert conditions.effort_limits == ((-150.0, 150.0),) * 3
     assert conditions.tolerance == 0.02
     assert load("ground: cement", "ground: 0.55").conditions.friction == 0.55
 

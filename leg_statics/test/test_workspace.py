@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from leg_kinematics import NotSupportedError, ParallelDrive, Status, ValueRangeError
+from leg_kinematics import Leg, NotSupportedError, ParallelDrive, Status, ValueRangeError
 from leg_kinematics.mechanisms import DoubleRhombus, GantryHybrid, TheoJansen
 from leg_statics.maps import plane_map
 from leg_statics.workspace import (
@@ -54,7 +54,7 @@ def test_typical_heights_lie_in_the_workspace_and_differ(mechanism):
     heights = typical_heights(mechanism)
     assert len(np.unique(heights)) == 6
     for height in heights:
-        assert np.isfinite(plane_map(mechanism, height, 0.05).values).any()
+        assert np.isfinite(plane_map(Leg.of(mechanism), height, 0.05).values).any()
 
 
 @pytest.mark.parametrize("axis", [0, 1])

@@ -291,7 +291,9 @@ def load_axes(normal):
     """Return the axes in which a force of the cone is (x, y, 1) / s, where 1 / s is the load.
 
     The direction in which a load counts enters here and nowhere else. It is the normal of the
-    ground, along which the cone's section is a circle.
+    ground, whose plane F·n = 1 cuts the cone in a circle. Of another direction u, less than
+    90° - atan(mu) from the normal, the plane F·u = 1 cuts an ellipse: its centre would stand in the
+    place of the normal, its semi-axes, divided by mu, in those of the tangents.
 
     Args:
         normal: Normal of the ground, of any length.

@@ -73,7 +73,7 @@ def index_picture(
     _check_heights(leg, heights)
     chosen = np.sort(heights if len(heights) else typical_heights(leg.mechanism))
     maps = {
-        height_title(height): plane_map(leg.mechanism, height, resolution, layers=[index])
+        height_title(height): plane_map(leg, height, resolution, layers=[index])
         for height in chosen.tolist()
     }
     return plot_maps(maps, index, title=title, figure=figure)
@@ -106,14 +106,7 @@ def capacity_picture(
     plane = initial_height(leg.mechanism) if height is None else height
     _check_heights(leg, [plane])
     maps = {
-        name: plane_map(
-            leg.mechanism,
-            plane,
-            resolution,
-            layers=[CAPACITY_LAYER],
-            effort_limits=leg.effort_limits,
-            contact=Contact(friction),
-        )
+        name: plane_map(leg, plane, resolution, layers=[CAPACITY_LAYER], contact=Contact(friction))
         for name, friction in _frictions(grounds).items()
     }
     where = ", ".join(filter(None, [title, height_title(plane)]))
@@ -153,7 +146,7 @@ def friction_picture(
     if len(chosen) != len(mechanisms):
         raise ShapeError(f"{len(mechanisms)} mechanisms need as many heights, got {len(chosen)}")
     curves = {
-        name: line_map(mechanism, y, height, LINE_RESOLUTION, layers=[RATED_FRICTION])
+        name: line_map(Leg.of(mechanism), y, height, LINE_RESOLUTION, layers=[RATED_FRICTION])
         for (name, mechanism), height in zip(mechanisms.items(), chosen, strict=True)
     }
     return plot_rated_friction(curves, grounds, title=title, figure=figure)
@@ -188,13 +181,7 @@ def steps_picture(
     z = np.sort(heights if len(heights) else np.linspace(lowest, highest, STEP_HEIGHTS))
     lengths = {
         criterion: {
-            name: longest_step(
-                leg.mechanism,
-                leg.effort_limits,
-                z,
-                Contact(friction, load=load),
-                criterion=criterion,
-            ).length
+            name: longest_step(leg, z, Contact(friction, load=load), criterion=criterion).length
             for name, friction in _frictions(grounds).items()
         }
         for criterion in Criterion

@@ -18,7 +18,7 @@ from leg_kinematics.errors import GeometryError, UnknownNameError, ValueRangeErr
 from leg_kinematics.geometry import geometry_parameters
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import Mirrored
-from leg_statics.capacity.problem import check_effort_limits
+from leg_kinematics.robot import Leg
 from leg_statics.design.averages import (
     FEWEST_POINTS,
     MOST_POINTS,
@@ -28,7 +28,6 @@ from leg_statics.design.averages import (
 )
 from leg_statics.footholds import Contact
 from leg_statics.indices import INDICES, Index, supported_indices
-from leg_statics.kinematics import Kinematics
 from leg_statics.maps import CAPACITY_LAYER, layer_values
 from leg_statics.step_length import Criterion, longest_step
 from leg_statics.workspace import is_spatial_leg
@@ -111,8 +110,6 @@ class Conditions:
         load: Normal load that every point of a step must bear [N].
         heights: Heights z of the foot in the leg frame among which the best is taken for the step
             [m]; none for six that stand for equal shares of each design's workspace.
-        effort_limits: Pairs (lower, upper) of the actuators' efforts [N.m or N]; none if they are
-            not needed.
         criterion: What makes a point of the step feasible.
         tolerance: Error to which means, volume and usable share are wanted, as the relative
             half-width of a 95 % confidence interval.
@@ -122,17 +119,15 @@ class Conditions:
     friction: float | None = None
     load: float = 0.0
     heights: tuple[float, ...] = ()
-    effort_limits: tuple[tuple[float, float], ...] = ()
     criterion: Criterion = Criterion.CAPACITY
     tolerance: float = 0.005
     most_points: int = MOST_POINTS
 
     def __post_init__(self) -> None:
-        """Check the fields; heights and limits may come as arrays.
+        """Check the fields; heights may come as an array.
 
         Raises:
             ValueRangeError: If a field is out of range.
-            ShapeError: If the limits are not pairs.
         """
         if self.friction is not None:
             as_non_negative("friction", self.friction)
@@ -145,11 +140,7 @@ class Conditions:
         heights = as_array("heights", self.heights)
         if not np.isfinite(heights).all():
             raise ValueRangeError(f"heights must be finite, got {self.heights}")
-        pairs = self.effort_limits if len(self.effort_limits) else np.empty((0, 2))
-        limits = as_array("effort_limits", pairs, 2)
-        check_effort_limits(limits[:, 0], limits[:, 1])
         object.__setattr__(self, "heights", tuple(heights.ravel().tolist()))
-        object.__setattr__(self, "effort_limits", tuple(map(tuple, limits.tolist())))
 
 
 @dataclass(frozen=True)
@@ -203,12 +194,8 @@ def changed_mechanism(base: Mechanism, changes: Mapping[str, float]) -> Mechanis
 
 def missing_condition(name: str, conditions: Conditions) -> str:
     """Return the name of a field of the conditions that a metric needs and does not have, or ""."""
-    if name not in (STEP_LENGTH, LOAD_CAPACITY):
-        return ""
-    if conditions.friction is None:
-        return "friction"
-    by_effort = name == LOAD_CAPACITY or conditions.criterion == Criterion.CAPACITY
-    return "effort_limits" if by_effort and not conditions.effort_limits else ""
+    on_ground = name in (STEP_LENGTH, LOAD_CAPACITY)
+    return "friction" if on_ground and conditions.friction is None else ""
 
 
 def supported_metrics(mechanism: Mechanism) -> tuple[str, ...]:
@@ -217,7 +204,7 @@ def supported_metrics(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def evaluate_design(
-    base: Mechanism,
+    base: Leg,
     changes: Mapping[str, float],
     metrics: Sequence[str],
     conditions: Conditions | None = None,
@@ -229,10 +216,10 @@ def evaluate_design(
     height; the longest of several heights may fall short of the longest of all.
 
     Args:
-        base: The mechanism whose other dimensions the design has.
+        base: The leg whose other dimensions and effort limits the design has.
         changes: New values of geometry parameters by their names [SI].
         metrics: Names of the metrics.
-        conditions: Ground, load, effort limits and accuracy.
+        conditions: Ground, load and accuracy.
 
     Returns:
         The values. What is wrong with the design is told, not raised.
@@ -249,14 +236,15 @@ def evaluate_design(
             raise ValueRangeError(f"metric {name!r} needs the condition {missing}")
     values = dict.fromkeys(metrics, float("nan"))
     try:
-        mechanism = changed_mechanism(base, changes)
+        mechanism = changed_mechanism(base.mechanism, changes)
     except GeometryError as error:
         return Evaluation(values, float("nan"), str(error))
+    leg = dataclasses.replace(base, mechanism=mechanism)
     defined = [name for name in metrics if _is_defined(mechanism, name, asked)]
     undefined = ", ".join(name for name in metrics if name not in defined)
     problems = [f"mechanism {mechanism.name!r} has no {undefined}"] if undefined else []
     if STEP_LENGTH in defined:
-        values[STEP_LENGTH] = _longest_step(mechanism, asked)
+        values[STEP_LENGTH] = _longest_step(leg, asked)
     averaged = [name for name in defined if name != STEP_LENGTH]
     if not averaged:
         return Evaluation(values, 0.0, "; ".join(problems))
@@ -264,9 +252,7 @@ def evaluate_design(
     contact = _contact(asked) if LOAD_CAPACITY in means else None
     found = average(
         mechanism,
-        lambda posture: layer_values(
-            Kinematics(mechanism, posture), means, asked.effort_limits, contact
-        ),
+        lambda posture: layer_values(leg, posture, means, contact),
         asked.tolerance,
         asked.most_points,
     )
@@ -284,15 +270,11 @@ def _is_defined(mechanism: Mechanism, name: str, conditions: Conditions) -> bool
     return all(METRICS[n].supports(mechanism) for n in needed)
 
 
-def _longest_step(mechanism: Mechanism, conditions: Conditions) -> float:
-    heights = conditions.heights or heights_by_volume(mechanism, STEP_HEIGHTS)
+def _longest_step(leg: Leg, conditions: Conditions) -> float:
+    heights = conditions.heights or heights_by_volume(leg.mechanism, STEP_HEIGHTS)
     if not len(heights):
         return 0.0
-    # the rated friction asks for no load: then the limits do not count, and none may be given
-    limits = conditions.effort_limits or ((0.0, 0.0),) * len(mechanism.joints)
-    step = longest_step(
-        mechanism, limits, heights, _contact(conditions), criterion=conditions.criterion
-    )
+    step = longest_step(leg, heights, _contact(conditions), criterion=conditions.criterion)
     return float(np.max(step.length))
 
 

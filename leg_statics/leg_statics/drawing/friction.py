@@ -60,7 +60,7 @@ def plot_rated_friction(
     highest = max((ground.friction_high for ground in grounds), default=0.0)
     for (name, line), style in zip(curves.items(), curve_styles(len(curves)), strict=True):
         x, friction = _inside(line)
-        ax.plot(x, friction, label=f"{name}, {height_title(line.z[0])}", **style)
+        ax.plot(x, friction, label=f"{name}, {height_title(float(line.height))}", **style)
         highest = max(highest, float(np.max(friction)))
     ax.set_ylim(0.0, 1.05 * min(highest, MOST_FRICTION))
     places = ", ".join(sorted({number_text(line.y[0], 2) for line in curves.values()}))
@@ -75,13 +75,13 @@ def plot_rated_friction(
 def _inside(line: IndexMap) -> tuple[FloatArray, FloatArray]:
     """Return x and mu_e where the line is inside the workspace; gaps are NaN."""
     values = line.layer(RATED_FRICTION)
-    if values.shape != (1, 1, len(line.x)):
+    if values.shape != (1, len(line.x)):
         raise ShapeError(f"a map to draw as a curve must be one line, got {values.shape}")
-    friction = values[0, 0]
+    friction = values[0]
     inside = np.flatnonzero(np.isfinite(friction))
     if not len(inside):
         raise ValueRangeError(
-            f"no point of the workspace at y = {line.y[0]:g} m, height {line.z[0]:g} m"
+            f"no point of the workspace at y = {line.y[0]:g} m, height {float(line.height):g} m"
         )
     stretch = slice(inside[0], inside[-1] + 1)
     return line.x[stretch], friction[stretch]

@@ -85,9 +85,9 @@ def plot_maps(
 
 
 def _plane(values: FloatArray) -> FloatArray:
-    if len(values) != 1:
-        raise ShapeError(f"a map to draw must have one plane, got {len(values)}")
-    return values[0]
+    if values.ndim != 2:
+        raise ShapeError(f"a map to draw must have one plane, got planes {values.shape[:-2]}")
+    return values
 
 
 def _common_box(panels: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> FloatArray:

@@ -36,9 +36,7 @@ def fill_footholds(
     contact = contact._replace(bias_efforts=read_bias(leg, request.bias_efforts))
     positions = read_rows("positions", request.positions, XYZ)
     check_count("positions", len(positions), max_points)
-    found = evaluate_footholds(
-        leg.mechanism, leg.effort_limits, frame.points_to_leg(positions), contact
-    )
+    found = evaluate_footholds(leg, frame.points_to_leg(positions), contact)
     response.verdict = to_field(found.verdict, np.uint8)
     response.status = to_field(found.status, np.uint8)
     response.load_capacity = to_field(found.load_capacity)

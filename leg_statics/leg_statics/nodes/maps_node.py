@@ -195,8 +195,8 @@ class MapsNode(RobotNode):
         response.x0, response.y0 = float(plane.x[0]), float(plane.y[0])
         response.height, response.resolution = request.height, request.resolution
         response.layers = list(plane.layers)
-        response.symbols = [find_layer(name).symbol for name in plane.layers]
-        response.units = [find_layer(name).unit for name in plane.layers]
+        response.symbols = list(plane.symbols)
+        response.units = list(plane.units)
         response.values = to_field(plane.values)
         response.status = to_field(plane.status, np.uint8)
         self.publish_map(leg, plane)
@@ -213,14 +213,7 @@ class MapsNode(RobotNode):
         count = ny * nx * (1 if height is not None else nz)
         check_count("resolution", count, self.value("max_points"))
         contact = read_ground(self._grounds, request.ground, frame)
-        return MapKey.of(
-            leg.mechanism,
-            height,
-            request.resolution,
-            tuple(request.layers),
-            leg.effort_limits,
-            contact,
-        )
+        return MapKey.of(leg, height, request.resolution, tuple(request.layers), contact)
 
     def cloud(self, frame_id: str, frame: LegFrame, index_map: IndexMap | None) -> Any:
         """Return the points of a map within the workspace as a cloud."""
@@ -289,11 +282,10 @@ class MapsNode(RobotNode):
             return no_workspace_marker(header, leg)
         try:
             key = MapKey.of(
-                leg.mechanism,
+                leg,
                 float(leg.mechanism.initial_posture.foot_position[2]),
                 self.value("marker_resolution"),
                 (layer,),
-                leg.effort_limits,
                 Contact(self.value("friction_coefficient")),
             )
             return workspace_marker(header, leg, self._memory.plane(key), layer)

@@ -107,9 +107,12 @@ def no_workspace_marker(header: Any, leg: Leg) -> Any:
 
 
 def grid_points(index_map: IndexMap) -> FloatArray:
-    """Return the grid points of a map (nz, ny, nx, 3) [m]."""
-    z, y, x = np.meshgrid(index_map.z, index_map.y, index_map.x, indexing="ij")
-    return np.stack([x, y, z], axis=-1)
+    """Return the grid points of a map (..., ny, nx, 3) [m]."""
+    points = np.empty((*index_map.status.shape, 3))
+    points[..., 0] = index_map.x
+    points[..., 1] = index_map.y[:, None]
+    points[..., 2] = index_map.height[..., None, None]
+    return points
 
 
 def colours(values: FloatArray) -> FloatArray:

@@ -138,7 +138,6 @@ def _fill(response: Any, legs: Sequence[Leg], common: CommonStep) -> None:
     response.rated_friction = to_field([step.rated_friction for step in steps])
     response.rated_friction_full = to_field([step.rated_friction_full for step in steps])
     response.profile_points = PROFILE_POINTS
-    response.common_lengths = to_field(common.length)
+    response.common_lengths = to_field(common.common_length)
     response.limiting_leg = to_field(common.limiting_leg, np.int32)
-    longer = common.length.size and np.max(common.length) > 0.0
-    response.best_height = int(np.argmax(common.length)) if longer else -1
+    response.best_height = common.best_height

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_kinematics import ParallelDrive
+from leg_kinematics import Leg, ParallelDrive
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanisms.walking_axes import leg_vectors
 from leg_statics.design.designs import STEP_LENGTH, Conditions, Evaluation, evaluate_design
@@ -183,7 +183,7 @@ def search(
         found = list(progress(workers.map(evaluate, designs)))
         means = np.array([[e.values[name] for name in names] for e in found])
         problems = np.array([e.problem for e in found])
-        reference = evaluate_design(leg, {}, names, SEARCH_CONDITIONS)
+        reference = evaluate_design(Leg.of(leg), {}, names, SEARCH_CONDITIONS)
         before = np.array([reference.values[name] for name in names])
         better = (problems == "") & (_objective(means, before) > 0.0)
         measure = partial(_evaluate, leg, tuple(grid), [STEP_LENGTH])
@@ -206,7 +206,7 @@ def _evaluate(
     leg: ParallelDrive, names: Sequence[str], metrics: Sequence[str], values: FloatArray
 ) -> Evaluation:
     changes = dict(zip(names, values.tolist(), strict=True))
-    return evaluate_design(leg, changes, metrics, SEARCH_CONDITIONS)
+    return evaluate_design(Leg.of(leg), changes, metrics, SEARCH_CONDITIONS)
 
 
 def _objective(means: FloatArray, before: FloatArray) -> FloatArray:
@@ -251,7 +251,7 @@ def mean_comparisons() -> list[Comparison]:
 
 def change_comparisons() -> list[Comparison]:
     """Compare what the optimisation does to the means, with means that have converged."""
-    before, after = (evaluate_design(leg, {}, list(CHANGES)) for leg in legs().values())
+    before, after = (evaluate_design(Leg.of(leg), {}, list(CHANGES)) for leg in legs().values())
     error = 100.0 * max(before.change, after.change)
     rows = []
     for name, published in CHANGES.items():
@@ -358,8 +358,7 @@ def step_comparisons() -> list[Comparison]:
         longest = {
             ground: float(
                 longest_step(
-                    leg,
-                    np.array([[-1.0, 1.0]] * 3),  # the criterion asks for no load
+                    Leg.of(leg),  # the criterion asks for no load
                     heights,
                     Contact(friction),
                     criterion=Criterion.RATED_FRICTION,

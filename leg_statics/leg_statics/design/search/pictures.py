@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.robot import Leg
 from leg_statics.design.designs import changed_mechanism, find_metric
 from leg_statics.design.search.geometry_search import Numbered, Outcome
 from leg_statics.drawing.designs import plot_convergence, plot_front, plot_parallel_coordinates
@@ -77,14 +78,14 @@ def _before_and_after(outcome: Outcome, winner: Numbered) -> dict[str, Figure]:
     if not is_spatial_leg(before):
         return {}
     after = changed_mechanism(before, study.changes(winner.design.parameters))
-    legs = {"before": before, "winner": after}
+    mechanisms = {"before": before, "winner": after}
     return {
         f"map_{name}": plot_maps(
             {
-                f"{label}, {height_title(initial_height(leg))}": plane_map(
-                    leg, initial_height(leg), MAP_RESOLUTION, layers=[name]
+                f"{label}, {height_title(initial_height(mechanism))}": plane_map(
+                    Leg.of(mechanism), initial_height(mechanism), MAP_RESOLUTION, layers=[name]
                 )
-                for label, leg in legs.items()
+                for label, mechanism in mechanisms.items()
             },
             name,
         )

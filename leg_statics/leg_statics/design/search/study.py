@@ -12,7 +12,6 @@ import numpy as np
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.documents import Document
-from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_statics.design.designs import Conditions, Evaluation, evaluate_design, find_metric
 from leg_statics.design.search.methods import Draw
@@ -82,13 +81,13 @@ class DesignTask(NamedTuple):
     """What it takes to evaluate designs, without the rest of their study.
 
     Attributes:
-        base: The mechanism whose other dimensions the designs have.
+        base: The leg whose other dimensions and effort limits the designs have.
         parameters: Names of the dimensions that differ.
         metrics: Names of the metrics.
         conditions: What they are measured under.
     """
 
-    base: Mechanism
+    base: Leg
     parameters: tuple[str, ...]
     metrics: tuple[str, ...]
     conditions: Conditions
@@ -155,7 +154,7 @@ class Study:
     def task(self) -> DesignTask:
         """What a worker needs to evaluate designs."""
         names = tuple(parameter.name for parameter in self.parameters)
-        return DesignTask(self.leg.mechanism, names, self.metrics, self.conditions)
+        return DesignTask(self.leg, names, self.metrics, self.conditions)
 
     def costs(self, values: FloatArray) -> FloatArray:
         """Return the objectives (..., K) among the metrics' values as costs: less is better."""

@@ -157,7 +157,7 @@ def study_from_document(document: Document, robot: str = "") -> Study:
             _constraint(document, name, units) for name in root.get("constraints", {})
         ),
         record=tuple(root.get("record", [])),
-        conditions=_conditions(document, leg, units),
+        conditions=_conditions(document, units),
         method=str(root["method"]["name"]),
         draw=_draw(document, parameters),
     )
@@ -261,7 +261,7 @@ def _constraint(document: Document, name: str, units: Mapping[str, float]) -> Co
     return Constraint(name, float(lower) * scale, float(upper) * scale)
 
 
-def _conditions(document: Document, leg: Leg, units: Mapping[str, float]) -> Conditions:
+def _conditions(document: Document, units: Mapping[str, float]) -> Conditions:
     entry = document.root.get("conditions", {})
     ground = entry.get("ground")
     if isinstance(ground, str):
@@ -273,7 +273,6 @@ def _conditions(document: Document, leg: Leg, units: Mapping[str, float]) -> Con
         friction=None if ground is None else float(ground),
         load=float(entry.get("load", 0.0)),
         heights=tuple(float(height) * units["length"] for height in entry.get("heights", [])),
-        effort_limits=tuple(map(tuple, leg.effort_limits.tolist())),
         criterion=Criterion[entry.get("criterion", Criterion.CAPACITY.name).upper()],
         tolerance=float(document.root.get("tolerance", 0.005)),
     )

@@ -1,0 +1,28 @@
+"""Legs: those of a robot, and one by itself."""
+
+import numpy as np
+import pytest
+
+from leg_kinematics import Leg, ParallelDrive, ShapeError
+
+
+def test_a_leg_by_itself_is_a_mechanism_with_limits_at_the_origin():
+    mechanism = ParallelDrive()
+    limits = np.array([[-1.0, 2.0], [-3.0, 4.0], [-5.0, 6.0]])
+    leg = Leg.of(mechanism, limits)
+    assert leg.mechanism is mechanism
+    assert leg.joint_names == tuple(joint.name for joint in mechanism.joints)
+    np.testing.assert_array_equal(leg.effort_limits, limits)
+    np.testing.assert_array_equal(leg.mount.to_base([0.1, 0.2, 0.3]), [0.1, 0.2, 0.3])
+
+
+def test_one_pair_of_limits_is_that_of_all_actuators_and_none_limits_nothing():
+    mechanism = ParallelDrive()
+    np.testing.assert_array_equal(Leg.of(mechanism, (-7, 8)).effort_limits, [[-7.0, 8.0]] * 3)
+    np.testing.assert_array_equal(Leg.of(mechanism).effort_limits, [[-np.inf, np.inf]] * 3)
+
+
+@pytest.mark.parametrize("limits", [np.zeros((2, 2)), np.zeros((3, 3)), np.zeros((1, 3, 2))])
+def test_limits_of_another_shape_are_refused(limits):
+    with pytest.raises(ShapeError, match="effort_limits"):
+        Leg.of(ParallelDrive(), limits)

@@ -1,0 +1,44 @@
+"""What `leg_statics` offers to those who use it in their own process."""
+
+from leg_statics.capacity.problem import CapacityStatus, LoadCapacity, load_capacity
+from leg_statics.contact import Contact
+from leg_statics.efforts import joint_efforts, utilisation
+from leg_statics.footholds import Footholds, Verdict, evaluate_footholds
+from leg_statics.grounds import Ground, Grounds, load_grounds
+from leg_statics.indices import INDICES, evaluate_indices, supported_indices
+from leg_statics.joint_stream import JointStream
+from leg_statics.leg_state import LegStates
+from leg_statics.maps import IndexMap, line_map, plane_map, supported_layers, volume_map
+from leg_statics.step_length import CommonStep, Criterion, StepLength, common_step, longest_step
+from leg_statics.workspace import workspace_bounds
+
+__all__ = [
+    "INDICES",
+    "CapacityStatus",
+    "CommonStep",
+    "Contact",
+    "Criterion",
+    "Footholds",
+    "Ground",
+    "Grounds",
+    "IndexMap",
+    "JointStream",
+    "LegStates",
+    "LoadCapacity",
+    "StepLength",
+    "Verdict",
+    "common_step",
+    "evaluate_footholds",
+    "evaluate_indices",
+    "joint_efforts",
+    "line_map",
+    "load_capacity",
+    "load_grounds",
+    "longest_step",
+    "plane_map",
+    "supported_indices",
+    "supported_layers",
+    "utilisation",
+    "volume_map",
+    "workspace_bounds",
+]
