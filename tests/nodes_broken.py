@@ -7,7 +7,8 @@ import sys
 
 from std_srvs.srv import Trigger
 
-from leg_kinematics.nodes.robot_node import RobotNode, run
+from leg_kinematics.nodes.node_process import run
+from leg_kinematics.nodes.robot_node import RobotNode
 
 
 class BrokenNode(RobotNode):

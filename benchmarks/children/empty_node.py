@@ -12,7 +12,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from leg_kinematics.nodes.robot_node import SERVICE_QOS, STREAM_QOS, run
+from leg_kinematics.nodes.node_process import run
+from leg_kinematics.nodes.robot_node import SERVICE_QOS, STREAM_QOS
 
 
 class EmptyNode(Node):

@@ -10,6 +10,7 @@ from leg_msgs_py.arrays import from_field
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
+from leg_kinematics.mechanism import Posture
 from leg_kinematics.robot import Leg, Mount, Robot
 
 XYZ = ("x", "y", "z")  # components of points and vectors, column by column
@@ -71,6 +72,39 @@ def check_count(field: str, count: int, limit: int, parameter: str = "max_points
             f"(parameter {parameter})",
             ErrorCode.TOO_LARGE,
         )
+
+
+def read_joints(leg: Leg, request: Any, limit: int) -> FloatArray:
+    """Return the `joint_positions` of a request (N, n).
+
+    Raises:
+        RequestError: If their number is wrong or too large.
+    """
+    joints = read_rows("joint_positions", request.joint_positions, leg.joint_names)
+    check_count("joint_positions", len(joints), limit)
+    return joints
+
+
+def read_feet(leg: Leg, request: Any, frame: LegFrame) -> FloatArray:
+    """Return the `positions` of a request in the leg frame (N, t).
+
+    Raises:
+        RequestError: If their number is wrong.
+    """
+    positions = read_rows("positions", request.positions, leg.mechanism.task_coordinates)
+    return frame.points_to_leg(positions)
+
+
+def read_posture(leg: Leg, request: Any, frame: LegFrame, limit: int) -> Posture:
+    """Return the postures (N,) at the `positions` of a request.
+
+    Raises:
+        RequestError: If their number is wrong or too large.
+        UnknownNameError: If the leg has no such assembly mode.
+    """
+    feet = read_feet(leg, request, frame)
+    check_count("positions", len(feet), limit)
+    return leg.mechanism.inverse(feet, request.assembly_mode)
 
 
 class LegFrame:

@@ -1,17 +1,12 @@
-"""What the nodes of a robot share: parameters, services, diagnostics, start and stop."""
+"""What the nodes of a robot share: parameters, services, streams and diagnostics."""
 
 from __future__ import annotations
 
-import gc
-import signal
-import sys
-import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from leg_msgs.msg import ErrorCode
 from rcl_interfaces.msg import (  # type: ignore[import-untyped]
@@ -21,23 +16,20 @@ from rcl_interfaces.msg import (  # type: ignore[import-untyped]
     SetParametersResult,
 )
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from rclpy.service import Service
+from rclpy.service import Service as ServiceServer
 from rclpy.service_introspection import ServiceIntrospectionState
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from leg_kinematics.description import load_robot
-from leg_kinematics.errors import LegError, ValueRangeError
+from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.nodes.health import Health
 from leg_kinematics.nodes.node_log import LibraryLog, NodeLog
 from leg_kinematics.nodes.requests import RequestError, error_code
+from leg_kinematics.nodes.service import Service
 from leg_kinematics.robot import Robot
 from leg_kinematics.warm_up import warm_up_kinematics
 
@@ -50,13 +42,12 @@ SERVICE_EVENTS = {
     "metadata": ServiceIntrospectionState.METADATA,
     "contents": ServiceIntrospectionState.CONTENTS,
 }
-STOP_TIMEOUT = 5.0  # a callback may take this long to end when the node stops [s]
 
 
 class RobotNode(Node):
     """A node that serves the legs of one robot description.
 
-    A subclass declares its services with `serve` and calls `announce` when it is ready. The robot
+    A subclass offers its services with `serve` and calls `announce` when it is ready. The robot
     can be exchanged at run time by setting the parameter `robot`; a description that is refused
     leaves the old one in force.
 
@@ -90,7 +81,7 @@ class RobotNode(Node):
             f"{', '.join(SERVICE_EVENTS)} (requests and responses, for recordings).",
         )
         _check_service_events(self.value("service_events"))
-        self._served: list[Service] = []
+        self._served: list[ServiceServer] = []
         self.robot: Robot = load_robot(self.value("robot"))
         self.warm_up(self.robot)
         self._candidate = self.robot
@@ -134,6 +125,12 @@ class RobotNode(Node):
         """Return the value of a parameter."""
         return self.get_parameter(name).value
 
+    @property
+    def max_points(self) -> int:
+        """Points accepted in one request."""
+        points: int = self.value("max_points")
+        return points
+
     def _check_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for parameter in parameters:
             try:
@@ -159,7 +156,7 @@ class RobotNode(Node):
             for service in self._served:
                 self._tell_events(service)
 
-    def _tell_events(self, service: Service) -> None:
+    def _tell_events(self, service: ServiceServer) -> None:
         """Publish as much of the calls of a service as the parameter `service_events` says."""
         state = SERVICE_EVENTS[self.value("service_events")]
         service.configure_introspection(self.get_clock(), SERVICE_QOS, state)
@@ -173,37 +170,31 @@ class RobotNode(Node):
     def robot_changed(self) -> None:
         """Take up a new robot description; `self.robot` is already the new one."""
 
-    def serve(
-        self,
-        service_type: Any,
-        name: str,
-        fill: Callable[[Any, Any], None],
-        fill_always: Callable[[Any], None] = lambda response: None,
-    ) -> None:
-        """Offer a service whose every fault becomes an error code.
+    def serve(self, services: Iterable[Service]) -> None:
+        """Offer services, each below the node's name."""
+        for each in services:
+            offered = self.create_service(
+                each.type, f"~/{each.name}", self._answerer(each), qos_profile=SERVICE_QOS
+            )
+            self._tell_events(offered)
+            self._served.append(offered)
 
-        Args:
-            service_type: Type of the service.
-            name: Name below the node's.
-            fill: Fills the response of a request, or raises.
-            fill_always: Fills what a response carries also on failure.
-        """
+    def _answerer(self, service: Service) -> Callable[[Any, Any], Any]:
+        """Return what is called with a request and an empty response."""
+        name = service.name
+        has_header = "header" in service.type.Response.get_fields_and_field_types()
+
+        def tell(error: Exception) -> str:
+            return self.failure(name, error)
 
         def answer(request: Any, response: Any) -> Any:
             with self.health.timed():
-                try:
-                    fill(request, response)
-                    response.error.code = ErrorCode.SUCCESS
-                except Exception as error:
-                    response = service_type.Response()
-                    response.error.code = error_code(error)
-                    response.error.message = self._failure(name, error)
-                fill_always(response)
+                response = service.answer(self, request, response, tell)
+                if has_header and response.error.code == ErrorCode.SUCCESS:
+                    response.header.stamp = self.get_clock().now().to_msg()
             return response
 
-        service = self.create_service(service_type, f"~/{name}", answer, qos_profile=SERVICE_QOS)
-        self._tell_events(service)
-        self._served.append(service)
+        return answer
 
     def listen(self, message_type: Any, topic: str, receive: Callable[[Any], None]) -> None:
         """Receive a stream of sensor data whose every fault is counted.
@@ -227,7 +218,7 @@ class RobotNode(Node):
                 try:
                     receive(_decoded(data, message_type))
                 except Exception as error:
-                    self._failure(topic, error)
+                    self.failure(topic, error)
 
         def lose(event: Any) -> None:
             self.health.drop(topic, "lost by the middleware", event.total_count_change)
@@ -253,8 +244,8 @@ class RobotNode(Node):
             f"(started in {seconds:.1f} s)"
         )
 
-    def _failure(self, source: str, error: Exception) -> str:
-        """Record a failed request and return its message."""
+    def failure(self, source: str, error: Exception) -> str:
+        """Record what a request or message raised, and return the message that tells it."""
         message = str(error)
         if error_code(error) == ErrorCode.INTERNAL:
             message = f"{type(error).__name__}: {message}"
@@ -321,115 +312,3 @@ class _Backlog:
 
     def _reach_end(self) -> None:
         self._count = -self._limit
-
-
-# --------------------------------------------------------------------------- start and stop
-
-
-def make_executor() -> Executor:
-    """Return the executor of all nodes: one thread, so that callbacks need no locks.
-
-    rclpy's other executors build a set of all that may happen anew, in Python, for every message:
-    that takes longer than to answer it.
-    """
-    return EventsExecutor()
-
-
-def run(make_node: Callable[[], RobotNode]) -> int:
-    """Run a node until SIGINT or SIGTERM.
-
-    The node spins in a thread and the main thread waits for signals, so that a signal never
-    interrupts a callback: a request under way is still answered.
-
-    Args:
-        make_node: Makes the node.
-
-    Returns:
-        Exit code: 0 after a signal, 1 if the node could not start or stopped by itself.
-    """
-    try:
-        _handle_signals(_interrupt)
-        return _spin_until_signal(make_node)
-    except KeyboardInterrupt:
-        return 0
-    except (LegError, ParameterException) as error:
-        print(f"cannot start: {error}", file=sys.stderr, flush=True)
-        return 1
-    finally:
-        _handle_signals(signal.SIG_IGN)  # until the process ends; the executor gave them back
-        rclpy.try_shutdown()
-
-
-def _spin_until_signal(make_node: Callable[[], RobotNode]) -> int:
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    executor = make_executor()
-    _handle_signals(_interrupt)  # the executor took them for itself
-    spinner = _Spinner(executor, make_node())
-    try:
-        if _stop_asked.is_set():
-            raise KeyboardInterrupt
-        spinner.ended.wait()
-        return 1
-    finally:
-        spinner.stop()
-
-
-def _handle_signals(handler: Any) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` leaves SIGINT ignored
-        signal.signal(number, handler)
-
-
-_stop_asked = threading.Event()
-
-
-def _interrupt(*_: object) -> None:
-    """Raise a KeyboardInterrupt at the first signal; further ones shall not disturb the end.
-
-    The signal is kept in mind, because what it meets at the start may swallow the exception, as
-    numba's compiler does now and then.
-    """
-    _handle_signals(lambda *_: None)
-    _stop_asked.set()
-    raise KeyboardInterrupt
-
-
-class _Spinner:
-    """Spins a node in a thread.
-
-    Attributes:
-        ended: Set when the node no longer spins.
-    """
-
-    def __init__(self, executor: Executor, node: RobotNode) -> None:
-        self.ended = threading.Event()
-        self._node = node
-        self._executor = executor
-        self._executor.add_node(node)
-        gc.collect()
-        gc.freeze()  # to search all that was imported for garbage would hold callbacks up
-        self._stopping = False
-        self._thread = threading.Thread(target=self._spin, name="spin", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Let the callback under way end, then destroy the node."""
-        self._stopping = True
-        self._executor.create_task(lambda: None)  # `wake` alone does not make spin_once return
-        self._thread.join(STOP_TIMEOUT)
-        if not self._thread.is_alive():
-            self._executor.shutdown()
-            self._node.destroy_node()
-
-    def _spin(self) -> None:
-        try:
-            while not self._stopping and rclpy.ok():
-                try:
-                    # without a time-out an `EventsExecutor` of rclpy 7.1 never wakes up
-                    self._executor.spin_once(timeout_sec=1.0)
-                except Exception:
-                    self._node.health.fault("executor", traceback.format_exc(limit=-1))
-                    text = traceback.format_exc()
-                    self._node.log.error("executor", text)
-                    time.sleep(0.01)  # a fault that stays must not take the whole processor
-        finally:
-            self.ended.set()

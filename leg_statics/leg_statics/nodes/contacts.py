@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.errors import DescriptionError
+from leg_kinematics.errors import DescriptionError, NotSupportedError
 from leg_kinematics.nodes.requests import LegFrame, RequestError
-from leg_kinematics.robot import Leg
+from leg_kinematics.robot import Leg, Robot
 from leg_statics.footholds import Contact
 from leg_statics.grounds import Grounds, load_grounds
 
@@ -36,6 +36,22 @@ def declare_grounds(node: RobotNode) -> Grounds:
     if not source:
         raise DescriptionError("parameter grounds: got ''; allowed: the path of a YAML file")
     return load_grounds(source)
+
+
+def standing_leg(robot: Robot, name: str) -> Leg:
+    """Return a leg by its name.
+
+    Raises:
+        UnknownNameError: If there is no such leg.
+        NotSupportedError: If it does not end in a foot that the ground could push.
+    """
+    leg = robot.leg(name)
+    if not leg.mechanism.has_point_foot:
+        raise NotSupportedError(
+            f"{leg.name}: mechanism {leg.mechanism.name!r} has the coordinates "
+            f"{', '.join(leg.mechanism.task_coordinates)}; ground reactions need x, y, z"
+        )
+    return leg
 
 
 def read_ground(grounds: Grounds, ground: Any, frame: LegFrame) -> Contact:

@@ -18,7 +18,8 @@ from leg_msgs.action import SearchGeometry
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.documents import Document
-from leg_kinematics.nodes.robot_node import RobotNode, run
+from leg_kinematics.nodes.node_process import run
+from leg_kinematics.nodes.robot_node import RobotNode
 from leg_statics.design.search.jobs import SearchJob
 from leg_statics.design.search.report import winner_robot
 from leg_statics.design.search.study import Study
@@ -84,7 +85,7 @@ class DesignsNode(RobotNode):
         )
         self.declare("scheduler", "", "Address of a Dask scheduler to use its workers instead.")
         self._queue = GoalQueue(
-            self, SearchGeometry, "search_geometry", "searches", self._begin, self._failure
+            self, SearchGeometry, "search_geometry", "searches", self._begin, self.failure
         )
         self.announce()
 

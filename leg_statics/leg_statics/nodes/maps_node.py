@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from leg_msgs.action import ComputeIndexMap
 from leg_msgs.msg import EffortLimits
-from leg_msgs.srv import GetIndexMap
 from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.clouds import to_cloud
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -21,21 +20,21 @@ from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.errors import LegError, NotSupportedError, UnknownNameError
+from leg_kinematics.errors import LegError, UnknownNameError
 from leg_kinematics.mechanism import Posture
+from leg_kinematics.nodes.node_process import run
 from leg_kinematics.nodes.requests import (
     LegFrame,
     RequestError,
-    check_count,
     find_frame,
 )
-from leg_kinematics.nodes.robot_node import RobotNode, run
+from leg_kinematics.nodes.robot_node import RobotNode
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact
 from leg_statics.map_jobs import MapJob, MapKey, MapMemory
-from leg_statics.maps import IndexMap, find_layer, grid_shape, supported_layers
-from leg_statics.nodes.contacts import declare_grounds, read_ground
+from leg_statics.maps import IndexMap, find_layer, supported_layers
+from leg_statics.nodes.contacts import declare_grounds
 from leg_statics.nodes.goal_queue import GoalQueue
 from leg_statics.nodes.markers import (
     Scene,
@@ -44,6 +43,8 @@ from leg_statics.nodes.markers import (
     no_workspace_marker,
     workspace_marker,
 )
+from leg_statics.nodes.services import SERVICES
+from leg_statics.nodes.services.maps import map_key
 from leg_statics.warm_up import warm_up_statics
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -97,7 +98,7 @@ class MapsNode(RobotNode):
     def __init__(self) -> None:
         super().__init__("maps")
         self._declare_parameters()
-        self._grounds = declare_grounds(self)
+        self.grounds = declare_grounds(self)
         self._memory = MapMemory(int(1e6 * self.value("map_memory")))
         self._limits: Any = None
         self._postures: dict[str, Posture] = {}
@@ -110,9 +111,9 @@ class MapsNode(RobotNode):
         self.add_post_set_parameters_callback(lambda parameters: self._draw())
         self.robot_changed()
         self._queue = GoalQueue(
-            self, ComputeIndexMap, "compute_index_map", "maps", self._begin, self._failure
+            self, ComputeIndexMap, "compute_index_map", "maps", self._begin, self.failure
         )
-        self.serve(GetIndexMap, "get_index_map", self.get_index_map)
+        self.serve(SERVICES["maps"])
         self.announce()
 
     def _declare_parameters(self) -> None:
@@ -185,35 +186,11 @@ class MapsNode(RobotNode):
 
     # ------------------------------------------------------------------ maps
 
-    def get_index_map(self, request: Any, response: Any) -> None:
-        """Fill the map of a plane."""
-        leg = self.robot.leg(request.leg)
-        key = self._key(leg, request, LegFrame(), request.height)
+    def plane(self, leg: Leg, key: MapKey) -> IndexMap:
+        """Return the map of a plane, and publish it."""
         plane = self._memory.plane(key)
-        response.header = self.header(leg.frame)
-        response.ny, response.nx = plane.status.shape[1:]
-        response.x0, response.y0 = float(plane.x[0]), float(plane.y[0])
-        response.height, response.resolution = request.height, request.resolution
-        response.layers = list(plane.layers)
-        response.symbols = list(plane.symbols)
-        response.units = list(plane.units)
-        response.values = to_field(plane.values)
-        response.status = to_field(plane.status, np.uint8)
         self.publish_map(leg, plane)
-
-    def _key(self, leg: Leg, request: Any, frame: LegFrame, height: float | None) -> MapKey:
-        """Return the key of the map that a request asks for.
-
-        Raises:
-            LegError: If it cannot be computed.
-        """
-        if not leg.mechanism.has_point_foot:
-            raise NotSupportedError(f"leg: {leg.name!r} has no point foot with x, y, z")
-        nz, ny, nx = grid_shape(leg.mechanism, request.resolution)
-        count = ny * nx * (1 if height is not None else nz)
-        check_count("resolution", count, self.value("max_points"))
-        contact = read_ground(self._grounds, request.ground, frame)
-        return MapKey.of(leg, height, request.resolution, tuple(request.layers), contact)
+        return plane
 
     def cloud(self, frame_id: str, frame: LegFrame, index_map: IndexMap | None) -> Any:
         """Return the points of a map within the workspace as a cloud."""
@@ -240,7 +217,7 @@ class MapsNode(RobotNode):
         """
         leg = self.robot.leg(request.leg)
         frame = find_frame(self.robot, leg, request.header.frame_id)
-        key = self._key(leg, request, frame, None)
+        key = map_key(self, leg, request, frame, None)
         unknown = set(request.layers) - set(supported_layers(leg.mechanism))
         if unknown:
             raise UnknownNameError("layer", unknown.pop(), supported_layers(leg.mechanism))
@@ -311,7 +288,7 @@ class MapsNode(RobotNode):
             try:
                 work()
             except Exception as error:
-                self._failure(source, error)
+                self.failure(source, error)
 
 
 def main() -> int:

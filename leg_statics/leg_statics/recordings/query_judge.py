@@ -1,4 +1,4 @@
-"""Queries of planners in a recording, answered again by the functions that the node answers with.
+"""Queries of planners in a recording, answered again by the services that the nodes answer with.
 
 A node whose parameter `service_events` is "contents" publishes its requests and responses. Every
 request is answered anew, with the robot, the limits and the grounds of the judge, and the answer is
@@ -7,27 +7,29 @@ compared with the recorded one.
 
 from __future__ import annotations
 
+import array
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from leg_msgs.msg import ErrorCode
-from leg_msgs.srv import QueryFootholds, QueryStepLength
-from leg_msgs_py.arrays import from_field, to_field
+from leg_msgs_py.arrays import to_field
 from leg_msgs_py.recordings.bags import Bag, BagMessage
 from leg_msgs_py.recordings.comparison import Difference, Tolerance, differences
 from leg_msgs_py.recordings.definitions import message_definition
 
 from leg_kinematics.errors import ValueRangeError
-from leg_kinematics.nodes.requests import error_code
-from leg_kinematics.robot import Robot
-from leg_statics.footholds import Verdict
+from leg_kinematics.nodes.service import Service, Summary
+from leg_kinematics.nodes.services import SERVICES as KINEMATICS
+from leg_kinematics.robot import Leg, Robot
 from leg_statics.grounds import Grounds
-from leg_statics.nodes.foothold_requests import fill_footholds
-from leg_statics.nodes.step_requests import fill_step_length
+from leg_statics.map_jobs import MapKey, MapMemory
+from leg_statics.maps import IndexMap
+from leg_statics.nodes.services import SERVICES as STATICS
 from leg_statics.recordings.findings import Envelope
 
 REQUEST_RECEIVED, RESPONSE_SENT = 1, 2  # of service_msgs/ServiceEventInfo, told by the node
@@ -40,20 +42,24 @@ EXACT, SAME = Tolerance(), Tolerance(absolute=1e-9, relative=1e-9)  # other mach
 NO_ANSWER = ("header", "error")  # fields that tell when, and what went wrong
 
 
-class Summary(NamedTuple):
-    """What an answer says in short.
+# Services by the names of their nodes, without those that change a node.
+SERVICES = {
+    node: tuple(service for service in services if not service.changes_host)
+    for node, services in {**KINEMATICS, **STATICS}.items()
+}
 
-    Attributes:
-        points: Candidate footholds, or legs times heights.
-        feasible: How many of them are feasible, or have a step.
-        best: Load capacity of the best foothold [N], or the longest common step [m]; NaN if none.
-        verdicts: How many footholds have which verdict.
-    """
 
-    points: int
-    feasible: int
-    best: float
-    verdicts: Counter[Verdict]
+class _Answerer(NamedTuple):
+    """Answers as the nodes do; they took the requests, so their limits allow them."""
+
+    robot: Robot
+    grounds: Grounds
+    max_points: int = sys.maxsize
+    max_steps: int = sys.maxsize
+
+    def plane(self, leg: Leg, key: MapKey) -> IndexMap:
+        """Return the map of a plane."""
+        return MapMemory(0).plane(key)
 
 
 class Query(NamedTuple):
@@ -96,11 +102,11 @@ class QueryJudge:
     Args:
         bag: The recording.
         grounds: Grounds that requests may name.
-        node: Name of the node that was asked.
+        node: Name of the statics node; the other nodes are in the same namespace.
 
     Attributes:
         inputs: Names of the topics to take.
-        services: Names of the services whose events they are.
+        services: Services whose events they are, by name.
         without_contents: Requests of which only the metadata were recorded.
         without_request: Responses whose request was not recorded.
 
@@ -109,21 +115,21 @@ class QueryJudge:
     """
 
     def __init__(self, bag: Bag, grounds: Grounds, node: str = "/statics") -> None:
-        topics = {f"{node}/{service.name}/_service_event": service for service in SERVICES}
+        topics = _event_topics(node)
         self._services = {topic: each for topic, each in topics.items() if topic in bag.topics}
         for topic, service in self._services.items():
-            if bag.topics[topic].type != service.event_type:
+            event_type = f"leg_msgs/srv/{service.type.__name__}_Event"
+            if bag.topics[topic].type != event_type:
                 raise ValueRangeError(
-                    f"topic {topic}: got {bag.topics[topic].type}; allowed: {service.event_type}"
+                    f"topic {topic}: got {bag.topics[topic].type}; allowed: {event_type}"
                 )
-            installed = message_definition(service.event_type).hash
-            if bag.types.hash_rihs01(service.event_type) != installed:
+            if bag.types.hash_rihs01(event_type) != message_definition(event_type).hash:
                 raise ValueRangeError(
-                    f"topic {topic}: {service.event_type} is not defined there as it is installed "
-                    "here: another version of leg_msgs"
+                    f"topic {topic}: {event_type} is not defined there as it is installed here: "
+                    "another version of leg_msgs"
                 )
         self.inputs = set(self._services)
-        self.services = [service.name for service in self._services.values()]
+        self.services = {service.name: service for service in self._services.values()}
         self.without_contents = 0
         self.without_request = 0
         self._forgotten = 0
@@ -182,27 +188,20 @@ class QueryJudge:
         return judged
 
     def _query(
-        self, service: _Service, robot: Robot, request: _Request, recorded: Any, seconds: float
+        self, service: Service, robot: Robot, request: _Request, recorded: Any, seconds: float
     ) -> Query:
-        wanted = _as_ros(service.response_type, recorded)
-        found = service.response_type()
-        try:
-            if wanted.error.code == ErrorCode.TOO_LARGE:  # the node's limits are not recorded
-                found.error.code = ErrorCode.TOO_LARGE
-            else:
-                # The node took the request, so its limits allow it.
-                service.fill(robot, self._grounds, sys.maxsize, request.content, found)
-                found.error.code = ErrorCode.SUCCESS
-        except Exception as error:  # as in the node: every fault becomes an error code
-            found = service.response_type()
-            found.error.code = error_code(error)
-            found.error.message = str(error)
+        wanted, found = service.type.Response(), service.type.Response()
+        _copy(recorded, wanted)
+        if wanted.error.code == ErrorCode.TOO_LARGE:  # the node's limits are not recorded
+            found.error.code = ErrorCode.TOO_LARGE
+        else:
+            found = service.answer(_Answerer(robot, self._grounds), request.content, found)
         exact = not _differences(service, wanted, found, EXACT)
         off = () if exact else _differences(service, wanted, found, SAME)
         code = wanted.error.code
         return Query(
             service.name,
-            service.legs(request.content),
+            _legs(request.content),
             request.time,
             seconds,
             "" if code == ErrorCode.SUCCESS else _error_name(code),
@@ -213,8 +212,24 @@ class QueryJudge:
         )
 
 
+def _event_topics(node: str) -> dict[str, Service]:
+    """Return the services by the topics of their events."""
+    namespace = node.rpartition("/")[0]
+    nodes = {name: f"{namespace}/{name}" for name in SERVICES} | {"statics": node}
+    return {
+        f"{nodes[name]}/{service.name}/_service_event": service
+        for name, services in SERVICES.items()
+        for service in services
+    }
+
+
+def _legs(request: Any) -> str:
+    """Return the legs that a request names, separated by blanks."""
+    return " ".join(request.legs) if hasattr(request, "legs") else str(request.leg)
+
+
 def _differences(
-    service: _Service, wanted: Any, found: Any, tolerance: Tolerance
+    service: Service, wanted: Any, found: Any, tolerance: Tolerance
 ) -> Sequence[Difference]:
     """Return where an answer is not the recorded one."""
     codes = wanted.error.code, found.error.code
@@ -225,79 +240,24 @@ def _differences(
     )
 
 
-def _as_ros(kind: Any, recorded: Any) -> Any:
-    """Return a decoded response as a message of ROS, without its header."""
-    message = kind()
-    message.error.code = int(recorded.error.code)
-    message.error.message = recorded.error.message
-    for name in kind.get_fields_and_field_types():
-        if name not in NO_ANSWER:
-            value = getattr(recorded, name)
-            is_array = isinstance(value, np.ndarray)
-            setattr(message, name, to_field(value, value.dtype) if is_array else value)
-    return message
+def _copy(recorded: Any, message: Any) -> None:
+    """Fill a message of ROS from a decoded one, but for its header."""
+    for name in message.get_fields_and_field_types():
+        value, place = getattr(recorded, name), getattr(message, name)
+        if name == "header":
+            continue
+        if hasattr(place, "get_fields_and_field_types"):
+            _copy(value, place)
+        elif isinstance(place, array.array):
+            setattr(message, name, to_field(value, value.dtype))
+        else:
+            setattr(message, name, value)
 
 
 def _error_name(code: int) -> str:
     """Return the name of an error code."""
     constants = (name for name in dir(ErrorCode) if name.isupper() and name[0] != "_")
     return next((name for name in constants if getattr(ErrorCode, name) == code), str(code))
-
-
-# --------------------------------------------------------------------------- services
-
-
-class _Service(NamedTuple):
-    """A service whose queries are judged.
-
-    Attributes:
-        name: Its name below the node's.
-        event_type: Type of its events.
-        response_type: Class of its responses.
-        fill: Answers a request as the node does.
-        legs: Returns the legs of a request, separated by blanks.
-        summary: Says in short what a response says.
-    """
-
-    name: str
-    event_type: str
-    response_type: Any
-    fill: Callable[[Robot, Grounds, int, Any, Any], None]
-    legs: Callable[[Any], str]
-    summary: Callable[[Any], Summary]
-
-
-def _foothold_summary(response: Any) -> Summary:
-    numbers, counts = np.unique(from_field(response.verdict, dtype=np.uint8), return_counts=True)
-    verdicts = Counter(dict(zip(map(Verdict, numbers), counts.tolist(), strict=True)))
-    best = response.load_capacity[response.best] if response.ranking else np.nan
-    return Summary(len(response.verdict), verdicts[Verdict.FEASIBLE], best, verdicts)
-
-
-def _step_summary(response: Any) -> Summary:
-    lengths, common = from_field(response.lengths), from_field(response.common_lengths)
-    best = float(np.max(common)) if common.size else np.nan
-    return Summary(len(lengths), int(np.sum(lengths > 0.0)), best, Counter())
-
-
-SERVICES = (
-    _Service(
-        "query_footholds",
-        "leg_msgs/srv/QueryFootholds_Event",
-        QueryFootholds.Response,
-        fill_footholds,
-        lambda request: request.leg,
-        _foothold_summary,
-    ),
-    _Service(
-        "query_step_length",
-        "leg_msgs/srv/QueryStepLength_Event",
-        QueryStepLength.Response,
-        fill_step_length,
-        lambda request: " ".join(request.legs),
-        _step_summary,
-    ),
-)
 
 
 # --------------------------------------------------------------------------- what stands out
@@ -333,7 +293,7 @@ class QueryTally:
     refused: int = 0
     points: int = 0
     feasible: int = 0
-    verdicts: Counter[Verdict] = field(default_factory=Counter)
+    verdicts: Counter[IntEnum] = field(default_factory=Counter)
     least: float = np.nan
     greatest: float = np.nan
     seconds: float = 0.0

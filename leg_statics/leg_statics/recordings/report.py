@@ -22,18 +22,18 @@ from matplotlib.ticker import LogFormatter
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import ValueRangeError
+from leg_kinematics.nodes.service import Service
 from leg_kinematics.status import Status
 from leg_statics.footholds import Verdict
 from leg_statics.recordings.bag_judge import BagJudge
 from leg_statics.recordings.diagnostic_log import DiagnosticLog, level_name
 from leg_statics.recordings.findings import Envelope, Findings, Quantity
-from leg_statics.recordings.query_judge import Query, QueryFindings, QueryJudge
+from leg_statics.recordings.query_judge import Query, QueryFindings, QueryJudge, QueryTally
 
 SUFFIXES = (".html", ".md")
 # Okabe and Ito's colours, told apart by colour-blind readers too; every curve has its own dashes.
 STYLES = (("#0072B2", "-"), ("#D55E00", "--"), ("#009E73", "-."), ("#CC79A7", ":"))
 BREAK = 20  # a pause of so many usual bins interrupts a curve
-UNITS = {"query_footholds": "N", "query_step_length": "m"}  # of the best answer
 MOST_DETAILS = 20  # lines of a list that can grow with the recording
 
 LEGEND = (
@@ -280,17 +280,16 @@ def _queries(case: Case, clock: _Clock) -> list[str]:
             f"{tally.feasible} ({100.0 * tally.feasible / tally.points:.1f} %)"
             if tally.points
             else 0,
-            f"{_number(tally.least)} to {_number(tally.greatest)} {UNITS[service]}"
-            if tally.feasible
-            else "none",
+            _best_text(tally, judge.services[service].best_unit),
             f"{1e3 * tally.seconds / tally.queries:.2f}, at most {1e3 * tally.longest:.2f}",
         )
         for (service, legs), tally in sorted(findings.tallies.items())
     ]
     lines = [
         _table(heads, services),
-        "Points are candidate footholds, or legs times heights. Best is the load capacity of the "
-        "best foothold, or the longest common step. Time is from the request to the response.",
+        "Points are foot positions, sets of joint positions, or legs times heights; feasible are "
+        "those with a pose, footholds that bear the load, and steps. Best is the load capacity of "
+        "the best foothold, or the longest common step. Time is from the request to the response.",
     ]
     verdicts = sum((tally.verdicts for tally in findings.tallies.values()), Counter[Verdict]())
     if verdicts:
@@ -321,12 +320,18 @@ def _queries(case: Case, clock: _Clock) -> list[str]:
     return lines
 
 
+def _best_text(tally: QueryTally, unit: str) -> str:
+    if np.isnan(tally.least) or not tally.feasible:
+        return "none"
+    return f"{_number(tally.least)} to {_number(tally.greatest)} {unit}"
+
+
 def _standing_out(findings: QueryFindings) -> list[tuple[str, list[Query]]]:
     """Return the queries that stand out, by what they have in common."""
     return [
         ("**Answers that are not as recorded**", findings.different),
         ("Queries that were refused", findings.refused),
-        ("Queries without a feasible foothold or step", findings.hopeless),
+        ("Queries without a feasible point", findings.hopeless),
     ]
 
 
@@ -338,7 +343,7 @@ def _remark(query: Query) -> str:
     if query.refused:
         return f"{query.refused}: {query.reason}"
     verdicts = sorted(query.answer.verdicts.items())
-    return ", ".join(f"{count} {verdict.name}" for verdict, count in verdicts) or "no step"
+    return ", ".join(f"{count} {verdict.name}" for verdict, count in verdicts) or "none feasible"
 
 
 def _diagnostics(case: Case, clock: _Clock) -> list[str]:
@@ -418,7 +423,7 @@ def _pictures(case: Case) -> dict[str, bytes]:
             for leg, curves in case.findings.curves.items()
         },
         **{
-            service: _png(draw_queries(curves, start, service))
+            service: _png(draw_queries(curves, start, case.queries.services[service]))
             for service, curves in case.query_findings.curves.items()
         },
     }
@@ -430,17 +435,18 @@ def _png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def draw_queries(curves: Envelope, start: int, service: str) -> Figure:
+def draw_queries(curves: Envelope, start: int, service: Service) -> Figure:
     """Draw what a service was asked and answered over time.
 
     Args:
         curves: The curves of `QueryFindings`.
         start: Time that counts as 0 [ns].
-        service: Name of the service.
+        service: The service.
     """
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     bands = _Bands(curves, start)
-    labels = ("feasible share", f"best answer [{UNITS[service]}]", "time to response [ms]")
+    best = f"best answer [{service.best_unit}]" if service.best_unit else "no best answer"
+    labels = ("feasible share", best, "time to response [ms]")
     rows = figure.subplots(len(labels), 1, sharex=True)
     for axes, name, label in zip(rows, curves.names, labels, strict=True):
         bands.draw(axes, name, label, (STYLES[0][0], ""), marker=".")
@@ -448,7 +454,7 @@ def draw_queries(curves: Envelope, start: int, service: str) -> Figure:
         axes.set_ylim(bottom=0.0)
         axes.grid(color="0.9")
     rows[-1].set_xlabel("time [s]")
-    figure.suptitle(service)
+    figure.suptitle(service.name)
     return figure
 
 

@@ -138,8 +138,8 @@ class QueryTable:
                 _field("seconds", pa.float64(), "s", "from the request to the response"),
                 _field("refused", pa.string(), "", "name of the recorded error, if any"),
                 _field("reason", pa.string(), "", "the message that came with it"),
-                _field("points", pa.int64(), "1", "candidate footholds, or legs times heights"),
-                _field("feasible", pa.int64(), "1", "those that are feasible, or have a step"),
+                _field("points", pa.int64(), "1", "foot or joint positions, or legs times heights"),
+                _field("feasible", pa.int64(), "1", "those with a pose, feasible, or with a step"),
                 _field("best", pa.float64(), "N or m", "load capacity, or longest common step"),
                 *(
                     _field(verdict.name.lower(), pa.int64(), "1", "footholds with this verdict")

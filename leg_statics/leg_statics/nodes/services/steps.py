@@ -1,12 +1,14 @@
-"""Requests for a step length: one leg in its own frame, or several that step together on a body."""
+"""The longest steps: one leg in its own frame, or several that step together on a body."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from leg_msgs.srv import QueryStepLength
 from leg_msgs_py.arrays import from_field, to_field
 
 from leg_kinematics.arrays import FloatArray
@@ -18,9 +20,10 @@ from leg_kinematics.nodes.requests import (
     check_count,
     find_frame,
 )
+from leg_kinematics.nodes.service import Summary, service
 from leg_kinematics.robot import Leg, Mount, Robot
-from leg_statics.grounds import Grounds
 from leg_statics.nodes.contacts import read_contact
+from leg_statics.nodes.hosts import StepsHost
 from leg_statics.step_length import (
     FORWARD,
     PROFILE_POINTS,
@@ -30,29 +33,24 @@ from leg_statics.step_length import (
 )
 
 
-def fill_step_length(
-    robot: Robot, grounds: Grounds, max_steps: int, request: Any, response: Any
-) -> None:
-    """Answer a `leg_msgs/QueryStepLength`, but for the header of the response.
+def _summary(response: Any) -> Summary:
+    lengths, common = from_field(response.lengths), from_field(response.common_lengths)
+    best = float(np.max(common)) if common.size else np.nan
+    return Summary(len(lengths), int(np.sum(lengths > 0.0)), best, Counter())
 
-    Args:
-        robot: The robot whose legs step.
-        grounds: Grounds that the request may name.
-        max_steps: How many legs times heights are accepted.
-        request: The request.
-        response: The response to fill.
 
-    Raises:
-        LegError: If the request cannot be carried out.
-    """
+@service(QueryStepLength, summary=_summary, best_unit="m")
+def query_step_length(host: StepsHost, request: Any, response: Any) -> None:
+    """Fill the longest steps of legs, each and together."""
+    robot = host.robot
     names = list(request.legs) or list(robot.legs)
     legs = [robot.leg(name) for name in names]
     on_body = _on_body(robot, legs, request.header.frame_id)
     if not on_body:
         legs = [replace(legs[0], mount=Mount(np.zeros(3), np.eye(3)))]
     heights = _finite("heights", request.heights)
-    check_count("legs and heights", len(legs) * len(heights), max_steps, "max_steps")
-    contact = read_contact(grounds, request, LegFrame())
+    check_count("legs and heights", len(legs) * len(heights), host.max_steps, "max_steps")
+    contact = read_contact(host.grounds, request, LegFrame())
     offsets = _lateral_offsets(request, legs)
     direction = _finite("direction", request.direction)
     if not direction.any():
@@ -65,6 +63,7 @@ def fill_step_length(
         direction=direction,
         criterion=_criterion(request),
     )
+    response.header.frame_id = request.header.frame_id
     _fill(response, legs, common)
     response.friction_coefficient = float(np.asarray(contact.friction))
 
