@@ -9,8 +9,10 @@ import make_golden_bags
 import numpy as np
 import pytest
 from backports import zstd
-from leg_msgs_py.recordings.bags import Bag, BagError, BagWriter
+from leg_msgs_py.recordings.bag_writer import BagWriter
+from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.definitions import message_definition
+from leg_msgs_py.recordings.errors import BagError
 from make_golden_bags import JOINT_STATE
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer

@@ -9,7 +9,9 @@ import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-from leg_msgs_py.recordings.bags import Bag, BagWriter, installed_types, offered_qos
+from leg_msgs_py.recordings.bag_types import installed_types
+from leg_msgs_py.recordings.bag_writer import BagWriter, offered_qos
+from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.definitions import message_definition
 from make_golden_bags import JOINT_STATE, TYPES, WRENCH
 from rosbags.highlevel import AnyReader

@@ -9,8 +9,10 @@ import pyarrow.parquet
 import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import Ground, LegClient
-from leg_msgs_py.recordings.bags import Bag, BagError, BagWriter
+from leg_msgs_py.recordings.bag_writer import BagWriter
+from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.definitions import message_definition
+from leg_msgs_py.recordings.errors import BagError
 from node_processes import NodeProcesses
 from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for
 from recorder_support import RecordProcess

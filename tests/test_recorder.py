@@ -14,8 +14,9 @@ from leg_msgs.msg import EffortLimits, LegStates
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.recordings import durable_bag
 from leg_msgs_py.recordings.bags import Bag
-from leg_msgs_py.recordings.definitions import UnknownTypeError, message_class, message_definition
-from leg_msgs_py.recordings.durable_bag import DurableBag, RecordingError
+from leg_msgs_py.recordings.definitions import message_class, message_definition
+from leg_msgs_py.recordings.durable_bag import DurableBag
+from leg_msgs_py.recordings.errors import RecorderError, UnknownTypeError
 from leg_msgs_py.recordings.record import main
 from leg_msgs_py.recordings.recorder import matching_qos, recorded_qos
 from nodes_support import START_TIMEOUT, wait_for
@@ -108,10 +109,10 @@ def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path, monkeypatch):
 
 
 def test_a_folder_that_exists_or_cannot_be_made_is_told(tmp_path):
-    with pytest.raises(RecordingError, match=f"{tmp_path} exists; a recording needs a new folder"):
+    with pytest.raises(RecorderError, match=f"{tmp_path} exists; a recording needs a new folder"):
         DurableBag(tmp_path).__enter__()
     (tmp_path / "file").touch()
-    with pytest.raises(RecordingError, match=r"cannot make .*/file/walk: Not a directory"):
+    with pytest.raises(RecorderError, match=r"cannot make .*/file/walk: Not a directory"):
         DurableBag(tmp_path / "file" / "walk").__enter__()
 
 
@@ -124,7 +125,7 @@ def test_a_disk_that_gets_full_ends_the_recording_which_is_whole(tmp_path, monke
     bag.__enter__()
     wait_for(lambda: bag.failure)
     bag.put(topic, 2, TEXT)
-    with pytest.raises(RecordingError, match=r"is full: 1 MiB left; what was recorded is whole"):
+    with pytest.raises(RecorderError, match=r"is full: 1 MiB left; what was recorded is whole"):
         bag.__exit__(None, None, None)
     assert (topic.written, topic.dropped) == (1, 1)
     with AnyReader([tmp_path / "walk"]) as reader:
@@ -133,7 +134,8 @@ def test_a_disk_that_gets_full_ends_the_recording_which_is_whole(tmp_path, monke
 
 WRITE_TOO_MUCH = """
 import resource, sys, time
-from leg_msgs_py.recordings.durable_bag import DurableBag, RecordingError
+from leg_msgs_py.recordings.durable_bag import DurableBag
+from leg_msgs_py.recordings.errors import RecorderError
 resource.setrlimit(resource.RLIMIT_FSIZE, (3_000_000, 3_000_000))
 try:
     with DurableBag(sys.argv[1]) as bag:
@@ -143,7 +145,7 @@ try:
             if bag.failure:
                 break
             time.sleep(1e-4)
-except RecordingError as error:
+except RecorderError as error:
     print(topic.written + topic.dropped == k, error)
 """
 

@@ -12,10 +12,12 @@ import rclpy
 from builtin_interfaces.msg import Time
 from leg_msgs.msg import LegState, LegStates
 from leg_msgs_py.arrays import to_field
-from leg_msgs_py.recordings.bags import Bag, BagWriter, offered_qos
+from leg_msgs_py.recordings.bag_writer import BagWriter, offered_qos
+from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.comparison import Tolerance, assert_same, differences, report
+from leg_msgs_py.recordings.errors import ReplayError
 from leg_msgs_py.recordings.recorder import spin
-from leg_msgs_py.recordings.replay import Replay, ReplayError, read_messages
+from leg_msgs_py.recordings.replay import Replay, read_messages
 from make_golden_bags import FAULTS, GARBLED
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, wait_for

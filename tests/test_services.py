@@ -12,7 +12,9 @@ from leg_msgs_py.arrays import to_field
 from leg_msgs_py.client import SERVICES as ASKED
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.client.questions import Order
-from leg_msgs_py.recordings.bags import Bag, BagWriter, installed_types
+from leg_msgs_py.recordings.bag_types import installed_types
+from leg_msgs_py.recordings.bag_writer import BagWriter
+from leg_msgs_py.recordings.bags import Bag
 from rclpy.action import get_action_server_names_and_types_by_node
 
 from leg_kinematics.nodes.services import SERVICES as KINEMATICS

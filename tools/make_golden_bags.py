@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from leg_msgs_py.recordings.bags import BagWriter, installed_types, offered_qos
+from leg_msgs_py.recordings.bag_types import installed_types
+from leg_msgs_py.recordings.bag_writer import BagWriter, offered_qos
 
 from leg_kinematics import load_robot
 from leg_kinematics.arrays import FloatArray

@@ -9,15 +9,13 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from leg_msgs_py.recordings.errors import UnknownTypeError
+
 # As rosbag2 has it: what stands between the definitions of a type and of those it holds, and before
 # the definition of a service, which stands for that of the service's events.
 SEPARATOR = "=" * 80
 SERVICE_MARK = "SRV: "
 EVENT_SUFFIX = "_Event"
-
-
-class UnknownTypeError(Exception):
-    """A message type is not installed here."""
 
 
 class Definition(NamedTuple):

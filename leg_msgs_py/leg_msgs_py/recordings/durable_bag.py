@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import cast
 
 from leg_msgs_py.recordings.definitions import Definition, message_definition
+from leg_msgs_py.recordings.errors import RecorderError
 from rosbags.interfaces import Connection, Qos
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
@@ -36,10 +37,6 @@ FLUSH_PERIOD = 0.5  # half of what may be lost, so that the disk has the other h
 QUEUE_SIZE = 128 * 2**20  # what may wait for a slow disk [B]
 MESSAGE_OVERHEAD = 150  # of a waiting message in memory, beside its data [B]
 LEAST_FREE = 64 * 2**20  # left on the disk, so that the index can still be written [B]
-
-
-class RecordingError(Exception):
-    """A recording cannot begin or go on; the message says why and what is kept."""
 
 
 @dataclass(eq=False)
@@ -77,7 +74,7 @@ class DurableBag:
         waiting: What waits in memory to be written [B].
 
     Raises:
-        RecordingError: On entering, if the folder exists or cannot be made; on leaving, if the
+        RecorderError: On entering, if the folder exists or cannot be made; on leaving, if the
             recording ended before. What was written until then is kept.
     """
 
@@ -100,9 +97,9 @@ class DurableBag:
             )
             self._writer.open()
         except WriterError:
-            raise RecordingError(f"{self.path} exists; a recording needs a new folder") from None
+            raise RecorderError(f"{self.path} exists; a recording needs a new folder") from None
         except OSError as error:
-            raise RecordingError(f"cannot make {self.path}: {error.strerror}") from None
+            raise RecorderError(f"cannot make {self.path}: {error.strerror}") from None
         self._thread.start()
         return self
 
@@ -157,11 +154,11 @@ class DurableBag:
             try:
                 self._write_until_the_end()
             except _DiskFullError as error:
-                self._fail(RecordingError(f"{error}; what was recorded is whole"))
+                self._fail(RecorderError(f"{error}; what was recorded is whole"))
             self._writer.close()
         except OSError as error:
             reason = f"cannot write {self.path}: {error.strerror}; all but the last second is kept"
-            self._fail(RecordingError(f"{reason}, without an index"))
+            self._fail(RecorderError(f"{reason}, without an index"))
         except Exception as error:
             self._fail(error)
         finally:

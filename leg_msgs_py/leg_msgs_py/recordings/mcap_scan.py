@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from backports import zstd
+from leg_msgs_py.recordings.errors import McapDamageError
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -41,10 +42,6 @@ class Channel(NamedTuple):
     encoding: str
     definition: str
     qos: str
-
-
-class McapDamageError(Exception):
-    """What is wrong with a file, and where."""
 
 
 class McapScan:

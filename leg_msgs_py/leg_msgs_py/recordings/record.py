@@ -12,7 +12,8 @@ from datetime import datetime
 from pathlib import Path
 
 import rclpy
-from leg_msgs_py.recordings.durable_bag import QUEUE_SIZE, DurableBag, RecordingError
+from leg_msgs_py.recordings.durable_bag import QUEUE_SIZE, DurableBag
+from leg_msgs_py.recordings.errors import RecorderError, RecordingError
 from leg_msgs_py.recordings.recorder import SUITE_TOPICS, Recorder, spin
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -98,11 +99,11 @@ def _parser() -> argparse.ArgumentParser:
 def _check(options: argparse.Namespace) -> None:
     for name in options.topics:
         if not name.startswith(("/", "*")):
-            raise RecordingError(f"--topics: {name!r} must begin with / (or with *)")
+            raise RecorderError(f"--topics: {name!r} must begin with / (or with *)")
     for name in ("duration", "queue"):
         value = getattr(options, name)
         if value is not None and not 0.0 < value < math.inf:
-            raise RecordingError(f"--{name} must be a number > 0, got {value:g}")
+            raise RecorderError(f"--{name} must be a number > 0, got {value:g}")
 
 
 def _record(options: argparse.Namespace, is_told_to_stop: Callable[[], bool]) -> None:

@@ -10,8 +10,9 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from leg_msgs_py.recordings.definitions import UnknownTypeError, message_class
+from leg_msgs_py.recordings.definitions import message_class
 from leg_msgs_py.recordings.durable_bag import DurableBag, RecordedTopic
+from leg_msgs_py.recordings.errors import UnknownTypeError
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor

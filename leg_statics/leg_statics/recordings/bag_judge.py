@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from leg_msgs_py.recordings.bags import Bag, BagError, BagMessage
+from leg_msgs_py.recordings.bags import Bag, BagMessage
+from leg_msgs_py.recordings.errors import BagError
 from numpy.typing import NDArray
 
 from leg_kinematics.arrays import FloatArray

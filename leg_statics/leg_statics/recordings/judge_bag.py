@@ -19,8 +19,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from leg_msgs_py.recordings.bags import SUFFIXES, Bag, BagError
-from leg_msgs_py.recordings.definitions import UnknownTypeError
+from leg_msgs_py.recordings.bag_files import SUFFIXES
+from leg_msgs_py.recordings.bags import Bag
+from leg_msgs_py.recordings.errors import BagError, RecordingError
 from tqdm import tqdm
 
 from leg_kinematics.description import load_robot
@@ -33,6 +34,7 @@ from leg_statics.recordings.diagnostic_log import DIAGNOSTICS, DiagnosticLog
 from leg_statics.recordings.findings import Findings
 from leg_statics.recordings.judged_bag import JudgedBag
 from leg_statics.recordings.query_judge import QueryFindings, QueryJudge
+from leg_statics.recordings.report_case import Case
 
 EXAMPLES = """\
 examples:
@@ -180,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for path in _run(options):
             print(path)
-    except (LegError, BagError, UnknownTypeError, OSError) as error:
+    except (LegError, RecordingError, OSError) as error:
         print(f"judge_bag: error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -220,7 +222,7 @@ def _run(options: argparse.Namespace) -> list[Path]:
         options.node,
     )
     judge = BagJudge(bag, robot, friction, topics, options.contact_force, options.gap)
-    case = report.Case(
+    case = Case(
         bag,
         judge,
         ground,
@@ -258,7 +260,7 @@ def _run(options: argparse.Namespace) -> list[Path]:
 
 
 def _judge(
-    case: report.Case,
+    case: Case,
     sinks: Sequence[Sink],
     query_sinks: Sequence[Sink],
     copy: JudgedBag | None,
@@ -335,7 +337,7 @@ def _ground(options: argparse.Namespace, grounds: Grounds) -> tuple[str, float]:
     return "as given", options.friction
 
 
-def _check_judged(case: report.Case) -> None:
+def _check_judged(case: Case) -> None:
     """Raise a ValueRangeError if neither a joint state nor a query could be judged."""
     bag, judge = case.bag, case.judge
     tally, topic = judge.tally, judge.topics.joint_states

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from leg_msgs_py.recordings.bags import Bag, BagMessage, BagWriter, installed_types, offered_qos
+from leg_msgs_py.recordings.bag_types import installed_types
+from leg_msgs_py.recordings.bag_writer import BagWriter, offered_qos
+from leg_msgs_py.recordings.bags import Bag, BagMessage
 
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot

@@ -1,0 +1,122 @@
+"""The message types of a recording, as it defines them or as they are installed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+from contextlib import suppress
+from typing import Any
+
+from leg_msgs_py.recordings.bag_files import Topic
+from leg_msgs_py.recordings.definitions import (
+    SEPARATOR,
+    SERVICE_MARK,
+    message_definition,
+    service_of_event,
+)
+from leg_msgs_py.recordings.errors import BagError, UnknownTypeError
+from rosbags.interfaces import MessageDefinitionFormat, Nodetype
+from rosbags.typesys import (
+    Stores,
+    TypesysError,
+    get_types_from_idl,
+    get_types_from_msg,
+    get_typestore,
+)
+from rosbags.typesys.store import Typestore
+
+EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+# What all service events have. rosbag2 leaves it out of definitions. Where ROS says char here and
+# means uint8, the parser understands something else, which has another hash.
+EVENT_INFO_TEXT = f"""\
+uint8 event_type
+builtin_interfaces/Time stamp
+uint8[16] client_gid
+int64 sequence_number
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+def installed_types(names: Iterable[str]) -> Typestore:
+    """Return message types as they are installed, with the types that their fields have.
+
+    Raises:
+        UnknownTypeError: If one is not installed.
+    """
+    types = get_typestore(Stores.EMPTY)
+    for name in names:
+        types.register(_types_of_text(message_definition(name).text, name))
+    return types
+
+
+def bag_types(topics: Collection[Topic]) -> Typestore:
+    """Return the types that a recording defines, and for those it does not, the installed ones.
+
+    Raises:
+        BagError: If it defines a type in two ways.
+    """
+    types = get_typestore(Stores.EMPTY)
+    for topic in topics:
+        defined = {}
+        with suppress(TypesysError):  # what one topic says in another way shall not hide the others
+            defined = _defined_types(topic)
+        try:
+            types.register(defined)
+        except TypesysError as error:
+            raise BagError(f"{topic.name}: {error}") from None
+    for topic in topics:
+        if topic.type not in types.fielddefs:
+            with suppress(UnknownTypeError):  # it can be copied, but not decoded
+                installed = installed_types([topic.type]).fielddefs
+                types.register({k: v for k, v in installed.items() if k not in types.fielddefs})
+    return types
+
+
+def _defined_types(topic: Topic) -> Any:
+    """Return the types that the definition of a topic holds."""
+    form, text = topic.definition
+    if not text:
+        return {}
+    if form == MessageDefinitionFormat.MSG:
+        return _types_of_text(text, topic.type)
+    if form == MessageDefinitionFormat.IDL:
+        parts = re.split(r"^={80}\nIDL: .*\n", text, flags=re.MULTILINE)
+        return {
+            name: fields
+            for part in filter(None, parts)
+            for name, fields in get_types_from_idl(part).items()
+        }
+    return {}
+
+
+def _types_of_text(text: str, name: str) -> dict[str, Any]:
+    """Return the types of the definition of a message, or of a service that stands for its events.
+
+    Raises:
+        TypesysError: If it is no such definition.
+    """
+    service = service_of_event(name)
+    if service is None:
+        return get_types_from_msg(text, name)
+    parts = text.split(f"{SEPARATOR}\n")[1:]
+    halves = re.split(r"^---\s*$", parts[0], flags=re.MULTILINE) if parts else []
+    if len(halves) != 2 or not parts[0].startswith(SERVICE_MARK):
+        raise TypesysError(f"no definition of the service {service}")
+    halves[0] = halves[0].partition("\n")[2]
+    # The parser knows messages only: of the same package, so that it finds what they refer to.
+    alias = service.replace("/srv/", "/msg/")
+    found: dict[str, Any] = {}
+    for half, kind in zip(halves, ("Request", "Response"), strict=True):
+        types = get_types_from_msg(f"{SEPARATOR}\n".join([half, *parts[1:]]), alias)
+        found[f"{service}_{kind}"] = types.pop(alias)
+        found |= types
+    found |= get_types_from_msg(EVENT_INFO_TEXT, EVENT_INFO)
+    contents = [
+        (kind.lower(), (Nodetype.SEQUENCE, ((Nodetype.NAME, f"{service}_{kind}"), 1)))
+        for kind in ("Request", "Response")
+    ]
+    found[name] = ([], [("info", (Nodetype.NAME, EVENT_INFO)), *contents])
+    return found
