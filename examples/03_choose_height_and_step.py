@@ -25,7 +25,7 @@ with LegClient(timeout=10.0) as client:
         except ServerUnavailableError as error:
             sys.exit(f"{error}\nStart the nodes first: make run")
         # The legs carry the load, and need no rougher ground than this even at full efforts.
-        steps = np.minimum(by_load.common_lengths, by_friction.common_lengths)
+        steps = np.minimum(by_load.common_length, by_friction.common_length)
         best = int(np.argmax(steps))
         print(f"  {ground:7} mu = {by_load.friction_coefficient:4.2f}         ", end=" ")
         print(*(f"{step:8.3f}" for step in steps), end="   ")

@@ -411,8 +411,8 @@ class TripodPlanner:
         )
         load, friction = by_load.wait(), by_friction.wait()
         starts, ends = (
-            np.maximum(load.starts, friction.starts),
-            np.minimum(load.ends, friction.ends),
+            np.maximum(load.start, friction.start),
+            np.minimum(load.end, friction.end),
         )
         lengths = np.fmax(ends[..., 0] - starts[..., 0], 0.0)
         centres = np.swapaxes(0.5 * (starts + ends), 0, 1)

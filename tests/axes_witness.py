@@ -240,7 +240,7 @@ class Questions:
             *("utilisation", "joint_efforts"),
         ):
             self.record.values(f"{place}/{field}", getattr(answer, field))
-        self.record.values(f"{place}/forces", self._back(frame)(answer.forces))
+        self.record.values(f"{place}/forces", self._back(frame)(answer.force))
         ranks = np.full(POINTS, np.nan)
         ranks[answer.ranking] = np.arange(len(answer.ranking)) / POINTS
         self.record.values(f"{place}/ranking", ranks)
@@ -263,11 +263,12 @@ class Questions:
                 )
                 at = f"{place}/{k}{'friction' if by_friction else 'capacity'}"
                 back = self._back(frame)
-                for field in ("lengths", "load_capacity", "rated_friction"):
+                self.record.values(f"{at}/lengths", answer.length[0])
+                for field in ("load_capacity", "rated_friction"):
                     self.record.values(f"{at}/{field}", getattr(answer, field)[0])
-                self.record.values(f"{at}/starts", back(answer.starts[0]))
-                self.record.values(f"{at}/ends", back(answer.ends[0]))
-                limits = np.stack([answer.start_limits[0], answer.end_limits[0]], axis=-1)
+                self.record.values(f"{at}/starts", back(answer.start[0]))
+                self.record.values(f"{at}/ends", back(answer.end[0]))
+                limits = np.stack([answer.start_limit[0], answer.end_limit[0]], axis=-1)
                 self.record.codes(f"{at}/limits", limits)
 
     def _maps(self, base_frame):

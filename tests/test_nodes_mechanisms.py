@@ -162,7 +162,7 @@ def test_a_turned_mount_turns_every_vector(zoo, name):
         name, height + leg.mount.position[2], 0.4, 5.0, direction=turned(oblique), frame=base
     )
     wanted = zoo.client.query_step_length(name, height, 0.4, 5.0, direction=oblique)
-    np.testing.assert_allclose(step.starts, leg.mount.to_base(wanted.starts), atol=1e-5)
+    np.testing.assert_allclose(step.start, leg.mount.to_base(wanted.start), atol=1e-5)
 
 
 @every_leg
@@ -213,4 +213,4 @@ def test_step_length_equals_the_library(zoo, name):
     height = float(np.median(postures(leg).foot_position[:, 2]))
     answer = zoo.client.query_step_length(name, height, 0.4, 5.0)
     step = longest_step(leg, height, Contact(0.4, load=5.0))
-    np.testing.assert_allclose(answer.lengths[0], step.length, atol=1e-9)
+    np.testing.assert_allclose(answer.length[0], step.length, atol=1e-9)

@@ -71,7 +71,7 @@ def test_footholds_equal_the_library(suite, hexapod, case):
     answer = suite.client.query_footholds(LEG, feet, ground, load, efforts=True, **options)
     assert_same_footholds(answer, wanted)
     np.testing.assert_allclose(answer.joint_efforts, wanted.joint_efforts, **SAME)
-    np.testing.assert_allclose(answer.forces, wanted.force, **SAME)
+    np.testing.assert_allclose(answer.force, wanted.force, **SAME)
     assert answer.friction_coefficient == contact.friction
     assert answer.joint_names == leg.joint_names
     assert answer.best == answer.ranking[0]
@@ -111,20 +111,20 @@ def test_footholds_in_the_base_frame_are_those_of_the_leg_frame(suite, hexapod):
     np.testing.assert_array_equal(base.verdict, own.verdict)
     np.testing.assert_allclose(base.load_capacity, own.load_capacity, rtol=1e-6)
     np.testing.assert_allclose(base.joint_efforts, own.joint_efforts, rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(base.forces, mount.vectors_to_base(own.forces), rtol=1e-6, atol=1e-4)
+    np.testing.assert_allclose(base.force, mount.vectors_to_base(own.force), rtol=1e-6, atol=1e-4)
 
 
 def test_efforts_come_only_if_asked_for(suite, hexapod):
     answer = suite.client.query_footholds(LEG, candidates(hexapod.legs[LEG]), "ice", 10.0)
     assert answer.joint_names == ()
-    assert answer.joint_efforts.size == answer.forces.size == 0
+    assert answer.joint_efforts.size == answer.force.size == 0
 
 
 def test_one_candidate_has_an_empty_batch(suite, hexapod):
     foot = hexapod.legs[LEG].mechanism.initial_posture.foot_position
     answer = suite.client.query_footholds(LEG, foot, "cement", 100.0, efforts=True)
     assert answer.feasible.shape == answer.load_capacity.shape == ()
-    assert answer.forces.shape == (3,)
+    assert answer.force.shape == (3,)
     assert answer.best == 0
 
 
@@ -179,19 +179,19 @@ def test_the_step_of_a_leg_equals_the_library(suite, hexapod, by_rated_friction)
         by_rated_friction=by_rated_friction,
     )
     assert answer.legs == (LEG,)
-    assert answer.lengths.shape == (1, 2, 2)
-    np.testing.assert_allclose(answer.lengths[0], wanted.length, **SAME)
-    np.testing.assert_allclose(answer.starts[0], wanted.start, **SAME)
-    np.testing.assert_allclose(answer.ends[0], wanted.end, **SAME)
-    np.testing.assert_array_equal(answer.start_limits[0], wanted.start_limit)
-    np.testing.assert_array_equal(answer.end_limits[0], wanted.end_limit)
+    assert answer.length.shape == (1, 2, 2)
+    np.testing.assert_allclose(answer.length[0], wanted.length, **SAME)
+    np.testing.assert_allclose(answer.start[0], wanted.start, **SAME)
+    np.testing.assert_allclose(answer.end[0], wanted.end, **SAME)
+    np.testing.assert_array_equal(answer.start_limit[0], wanted.start_limit)
+    np.testing.assert_array_equal(answer.end_limit[0], wanted.end_limit)
     np.testing.assert_allclose(answer.load_capacity[0], wanted.load_capacity, rtol=1e-6)
     np.testing.assert_allclose(answer.rated_friction[0], wanted.rated_friction, **SAME)
     np.testing.assert_allclose(answer.rated_friction_full[0], wanted.rated_friction_full, **SAME)
-    np.testing.assert_allclose(answer.common_lengths, wanted.length, **SAME)
+    np.testing.assert_allclose(answer.common_length, wanted.length, **SAME)
     assert answer.best_height == np.argmax(wanted.length)
-    assert answer.lengths[0, 1, 1] == 0.0
-    assert np.isnan(answer.starts[0, 1, 1]).all()
+    assert answer.length[0, 1, 1] == 0.0
+    assert np.isnan(answer.start[0, 1, 1]).all()
 
 
 def test_the_common_step_equals_the_library(suite, hexapod):
@@ -201,13 +201,13 @@ def test_the_common_step_equals_the_library(suite, hexapod):
         (), [-0.65, -0.7], Ground("cement", contact.normal), 250.0, moment=contact.moment
     )
     assert answer.legs == tuple(hexapod.legs)
-    np.testing.assert_allclose(answer.common_lengths, wanted.common_length, **SAME)
+    np.testing.assert_allclose(answer.common_length, wanted.common_length, **SAME)
     np.testing.assert_array_equal(answer.limiting_leg, wanted.limiting_leg)
     for k, (name, step) in enumerate(wanted.steps.items()):
         mount = hexapod.legs[name].mount
-        np.testing.assert_allclose(answer.lengths[k], step.length, **SAME)
-        np.testing.assert_allclose(answer.starts[k], mount.to_base(step.start), **SAME)
-        np.testing.assert_allclose(answer.ends[k], mount.to_base(step.end), **SAME)
+        np.testing.assert_allclose(answer.length[k], step.length, **SAME)
+        np.testing.assert_allclose(answer.start[k], mount.to_base(step.start), **SAME)
+        np.testing.assert_allclose(answer.end[k], mount.to_base(step.end), **SAME)
     assert answer.best_height == wanted.best_height
 
 
@@ -221,20 +221,20 @@ def test_a_slope_has_the_same_meaning_for_one_leg_in_either_frame(suite, hexapod
         200.0,
         frame=hexapod.base_frame,
     )
-    np.testing.assert_allclose(base.lengths, own.lengths, atol=1e-5)
-    np.testing.assert_allclose(base.starts, leg.mount.to_base(own.starts), atol=1e-5)
+    np.testing.assert_allclose(base.length, own.length, atol=1e-5)
+    np.testing.assert_allclose(base.start, leg.mount.to_base(own.start), atol=1e-5)
 
 
 def test_no_heights_give_an_empty_answer(suite):
     answer = suite.client.query_step_length((), [], "cement")
-    assert answer.lengths.shape == (6, 0)
+    assert answer.length.shape == (6, 0)
     assert answer.best_height == -1
 
 
 def test_a_height_that_no_leg_reaches_has_no_best(suite):
     answer = suite.client.query_step_length((), [-9.0], "cement")
     assert answer.best_height == -1
-    assert not answer.lengths.any()
+    assert not answer.length.any()
 
 
 # --------------------------------------------------------------------------- bad requests

@@ -196,7 +196,7 @@ def test_the_summary_says_what_the_planner_was_answered(recorded):
         )
     assert hundreds[0] == hundreds[2] != hundreds[1]  # the limits in force count
     step, _ = (q.answer for q in by_service["query_step_length"] if q.legs != "right_front")
-    assert (step.points, step.best) == (12, np.max(steps.common_lengths))
+    assert (step.points, step.best) == (12, np.max(steps.common_length))
 
 
 def test_recorded_answers_equal_direct_calls_of_the_library(recorded):

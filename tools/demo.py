@@ -184,7 +184,7 @@ def show_step_lengths(client: LegClient) -> None:
     for ground in GROUNDS:
         for criterion, rated in (("load capacity", False), ("mu_e <= mu", True)):
             answer = client.query_step_length((), -HEIGHTS, ground, LOAD, by_rated_friction=rated)
-            steps = [f"{step:.3f}" for step in answer.common_lengths]
+            steps = [f"{step:.3f}" for step in answer.common_length]
             if answer.best_height >= 0:
                 steps[answer.best_height] = f"[bold]{steps[answer.best_height]}[/bold]"
             first = f"{ground}, mu {answer.friction_coefficient:g}" if not rated else ""

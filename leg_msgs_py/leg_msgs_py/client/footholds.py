@@ -31,7 +31,7 @@ class Footholds(NamedTuple):
         friction_coefficient: Friction coefficient that was used.
         joint_names: Names of the actuated joints (n); empty unless efforts were asked for.
         joint_efforts: Efforts that hold the required load (..., n) [N.m or N].
-        forces: Ground reaction that uses the actuators least (..., 3) [N].
+        force: Ground reaction that uses the actuators least (..., 3) [N].
     """
 
     verdict: NDArray[np.uint8]
@@ -47,7 +47,7 @@ class Footholds(NamedTuple):
     friction_coefficient: float
     joint_names: tuple[str, ...]
     joint_efforts: FloatArray
-    forces: FloatArray
+    force: FloatArray
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -111,7 +111,7 @@ def query_footholds(
             friction_coefficient=response.friction_coefficient,
             joint_names=names,
             joint_efforts=from_field(response.joint_efforts, (*feet.batch, len(names))),
-            forces=from_field(response.forces, (*feet.batch, 3 if efforts else 0)),
+            force=from_field(response.force, (*feet.batch, 3 if efforts else 0)),
         )
 
     return Request(request, decode, feet)

@@ -19,30 +19,30 @@ class StepLengths(NamedTuple):
 
     Attributes:
         legs: Names of the legs (L).
-        lengths: Step length of each leg (L, ...) [m]; 0 where no point is feasible.
-        starts: Rear ends (L, ..., 3) [m]; NaN where there is none.
-        ends: Front ends (L, ..., 3) [m].
-        start_limits: `leg_msgs/FootholdVerdict` just behind the rear ends (L, ...).
-        end_limits: The same just before the front ends (L, ...).
+        length: Step length of each leg (L, ...) [m]; 0 where no point is feasible.
+        start: Rear ends (L, ..., 3) [m]; NaN where there is none.
+        end: Front ends (L, ..., 3) [m].
+        start_limit: `leg_msgs/FootholdVerdict` just behind the rear ends (L, ...).
+        end_limit: The same just before the front ends (L, ...).
         load_capacity: Load capacity along the stances (L, ..., P) [N].
         rated_friction: mu_e = |F_x| / |F_z|, forward over vertical, along them (L, ..., P).
         rated_friction_full: sqrt(F_x² + F_y²) / |F_z| along them (L, ..., P).
-        common_lengths: The step that all legs can make together (...,) [m].
+        common_length: The step that all legs can make together (...,) [m].
         limiting_leg: Index of the leg with the shortest step (...,).
         best_height: Flat index of the longest common step; -1 if there is none.
         friction_coefficient: Friction coefficient that was used.
     """
 
     legs: tuple[str, ...]
-    lengths: FloatArray
-    starts: FloatArray
-    ends: FloatArray
-    start_limits: NDArray[np.uint8]
-    end_limits: NDArray[np.uint8]
+    length: FloatArray
+    start: FloatArray
+    end: FloatArray
+    start_limit: NDArray[np.uint8]
+    end_limit: NDArray[np.uint8]
     load_capacity: FloatArray
     rated_friction: FloatArray
     rated_friction_full: FloatArray
-    common_lengths: FloatArray
+    common_length: FloatArray
     limiting_leg: NDArray[np.int32]
     best_height: int
     friction_coefficient: float
@@ -99,15 +99,15 @@ def query_step_length(
         profile = (*batch, response.profile_points)
         return StepLengths(
             legs=tuple(response.legs),
-            lengths=from_field(response.lengths, batch),
-            starts=from_field(response.starts, (*batch, 3)),
-            ends=from_field(response.ends, (*batch, 3)),
-            start_limits=from_field(response.start_limits, batch, np.uint8),
-            end_limits=from_field(response.end_limits, batch, np.uint8),
+            length=from_field(response.length, batch),
+            start=from_field(response.start, (*batch, 3)),
+            end=from_field(response.end, (*batch, 3)),
+            start_limit=from_field(response.start_limit, batch, np.uint8),
+            end_limit=from_field(response.end_limit, batch, np.uint8),
             load_capacity=from_field(response.load_capacity, profile),
             rated_friction=from_field(response.rated_friction, profile),
             rated_friction_full=from_field(response.rated_friction_full, profile),
-            common_lengths=from_field(response.common_lengths, levels.shape),
+            common_length=from_field(response.common_length, levels.shape),
             limiting_leg=from_field(response.limiting_leg, levels.shape, np.int32),
             best_height=response.best_height,
             friction_coefficient=response.friction_coefficient,

@@ -34,6 +34,7 @@ def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
     positions = read_rows("positions", request.positions, XYZ)
     check_count("positions", len(positions), host.max_points)
     found = evaluate_footholds(leg, frame.points_to_leg(positions), contact)
+    ranking = found.ranking
     response.header.frame_id = request.header.frame_id
     response.verdict = to_field(found.verdict, np.uint8)
     response.status = to_field(found.status, np.uint8)
@@ -43,10 +44,10 @@ def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
     response.friction_margin = to_field(found.friction_margin)
     response.utilisation = to_field(found.utilisation)
     response.limiting_joint = to_field(found.limiting_joint, np.int32)
-    response.ranking = to_field(found.ranking, np.int32)
-    response.best = found.best
+    response.ranking = to_field(ranking, np.int32)
+    response.best = int(ranking[0]) if len(ranking) else -1  # `found.best` would rank again
     response.friction_coefficient = float(np.asarray(contact.friction))
     if request.include_efforts:
         response.joint_names = list(leg.joint_names)
         response.joint_efforts = to_field(found.joint_efforts)
-        response.forces = to_field(frame.vectors_from_leg(found.force))
+        response.force = to_field(frame.vectors_from_leg(found.force))

@@ -34,7 +34,7 @@ from leg_statics.step_length import (
 
 
 def _summary(response: Any) -> Summary:
-    lengths, common = from_field(response.lengths), from_field(response.common_lengths)
+    lengths, common = from_field(response.length), from_field(response.common_length)
     best = float(np.max(common)) if common.size else np.nan
     return Summary(len(lengths), int(np.sum(lengths > 0.0)), best, Counter())
 
@@ -128,15 +128,15 @@ def _fill(response: Any, legs: Sequence[Leg], common: CommonStep) -> None:
     steps = [common.steps[leg.name] for leg in legs]
     mounted = [(leg.mount, step) for leg, step in zip(legs, steps, strict=True)]
     response.legs = [leg.name for leg in legs]
-    response.lengths = to_field([step.length for step in steps])
-    response.starts = to_field([mount.to_base(step.start) for mount, step in mounted])
-    response.ends = to_field([mount.to_base(step.end) for mount, step in mounted])
-    response.start_limits = to_field([step.start_limit for step in steps], np.uint8)
-    response.end_limits = to_field([step.end_limit for step in steps], np.uint8)
+    response.length = to_field([step.length for step in steps])
+    response.start = to_field([mount.to_base(step.start) for mount, step in mounted])
+    response.end = to_field([mount.to_base(step.end) for mount, step in mounted])
+    response.start_limit = to_field([step.start_limit for step in steps], np.uint8)
+    response.end_limit = to_field([step.end_limit for step in steps], np.uint8)
     response.load_capacity = to_field([step.load_capacity for step in steps])
     response.rated_friction = to_field([step.rated_friction for step in steps])
     response.rated_friction_full = to_field([step.rated_friction_full for step in steps])
     response.profile_points = PROFILE_POINTS
-    response.common_lengths = to_field(common.common_length)
+    response.common_length = to_field(common.common_length)
     response.limiting_leg = to_field(common.limiting_leg, np.int32)
     response.best_height = common.best_height
