@@ -41,7 +41,7 @@ def mixed_description() -> dict:
             for f, v in geometry_of(jansen).items()
         },
         "joint_limits": {j.name: [-180, 180] for j in jansen.joints},
-        "passive_joint_limits": {j.name: [-180, 180] for j in jansen.passive_joints},
+        "passive_joint_limits": {e.name: [-180, 180] for e in jansen.excursions},
         "effort_limits": {j.name: 1.0 for j in jansen.joints},
     }
     mount = {"position": [0, -100, 0], "rpy": [0, 0, 30]}

@@ -57,7 +57,9 @@ def test_inverse_kinematics_equals_the_library(suite, hexapod, name):
     assert_same(answer.status, posture.status)
     assert_same(answer.passive_joint_positions, leg.mechanism.passive_joint_positions(posture))
     assert answer.joint_names == leg.joint_names
-    assert answer.passive_joint_names == tuple(j.name for j in leg.mechanism.passive_joints)
+    assert answer.passive_joint_names == leg.passive_joint_names
+    assert_same(answer.excursions, leg.mechanism.passive_joint_excursions(posture))
+    assert answer.excursion_names == tuple(e.name for e in leg.mechanism.excursions)
     assert answer.assembly_modes == leg.mechanism.assembly_modes[:1]
     assert len(set(answer.status.ravel())) >= 3  # the sample is worth testing
 
@@ -172,7 +174,12 @@ def test_the_description_equals_the_robot(suite, hexapod):
         assert told.assembly_modes == mechanism.assembly_modes
         assert told.index_names == supported_indices(mechanism)
         assert_same(told.joint_limits, mechanism.joint_limits)
-        assert_same(told.passive_joint_limits, mechanism.passive_joint_limits)
+        assert told.passive_joint_names == leg.passive_joint_names
+        assert told.passive_joint_types == tuple(j.type for j in mechanism.passive_joints)
+        assert told.passive_joint_units == tuple(j.unit for j in mechanism.passive_joints)
+        assert told.excursion_names == tuple(e.name for e in mechanism.excursions)
+        assert told.excursion_units == tuple(e.unit for e in mechanism.excursions)
+        assert_same(told.excursion_limits, mechanism.passive_joint_limits)
         assert_same(told.initial_foot_position, mechanism.initial_posture.foot_position)
         assert_same(told.mount_position, leg.mount.position)
         assert math.isclose(np.linalg.norm(told.mount_orientation), 1.0)

@@ -1,4 +1,4 @@
-"""Checks of array arguments: one place for the shape rule of the suite.
+"""Arrays: checks of arguments, one place for the shape rule of the suite, and angles.
 
 Every public function takes arrays with any leading batch axes; only the trailing axes are fixed.
 """
@@ -117,3 +117,10 @@ def as_non_negative(name: str, value: ArrayLike) -> FloatArray:
     if np.any(bad):
         raise ValueRangeError(f"{name} must be >= 0, got {array[bad].flat[0]}")
     return array
+
+
+def wrapped_angles(angles: ArrayLike) -> FloatArray:
+    """Return the angles (...) in [-pi, pi) that differ by whole turns [rad]."""
+    array = np.asarray(angles, np.float64)
+    turns = np.floor(array / (2.0 * np.pi) + 0.5)
+    return array - 2.0 * np.pi * turns

@@ -10,7 +10,7 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
         mechanism: parallel_drive
         geometry: {crank_spacing: 276, ...}             # every parameter of the mechanism
         joint_limits: {crank_1: [-21, 21], ...}
-        passive_joint_limits: {u1_along: [-45, 45], ...}
+        passive_joint_limits: {u1_along: [-45, 45], ...}  # of excursions from the initial posture
         effort_limits: {crank_1: 150, crank_2: [-150, 120], ...}
     legs:
       left_front:
@@ -45,7 +45,7 @@ from leg_kinematics.documents import (
 from leg_kinematics.errors import DescriptionError, GeometryError, NotSupportedError
 from leg_kinematics.files import existing_path, exists, user_path
 from leg_kinematics.geometry import geometry_parameters
-from leg_kinematics.mechanism import Joint
+from leg_kinematics.mechanism import Excursion, Joint, Mechanism
 from leg_kinematics.mechanisms import MECHANISMS
 from leg_kinematics.mirrored import Mirrored
 from leg_kinematics.robot import Leg, Mount, Robot
@@ -96,20 +96,20 @@ ROBOT_SCHEMA = mapping_schema(
 )
 
 
-def _leg_type_schema(mechanism: Any) -> dict[str, Any]:
-    """Return the schema of a leg type, made from the mechanism's own fields and joints."""
+def _leg_type_schema(mechanism: Mechanism) -> dict[str, Any]:
+    """Return the schema of a leg type, made from the fields and joints of such a mechanism."""
     geometry = {
         f.name: {**NUMBER, "exclusiveMinimum": 0} if f.metadata["positive"] else NUMBER
         for f in geometry_parameters(mechanism)
     }
     joints = [j.name for j in mechanism.joints]
-    passive = [j.name for j in mechanism.passive_joints]
+    excursions = [e.name for e in mechanism.excursions]
     return mapping_schema(
         {
             "mechanism": {"const": mechanism.name},
             "geometry": mapping_schema(geometry, list(geometry)),
             "joint_limits": mapping_schema(dict.fromkeys(joints, PAIR), joints),
-            "passive_joint_limits": mapping_schema(dict.fromkeys(passive, PAIR), passive),
+            "passive_joint_limits": mapping_schema(dict.fromkeys(excursions, PAIR), excursions),
             "effort_limits": mapping_schema(dict.fromkeys(joints, EFFORT), joints),
         },
         ["mechanism", "geometry", "joint_limits", "passive_joint_limits", "effort_limits"],
@@ -182,7 +182,7 @@ def robot_from_document(document: Document) -> Robot:
     document.check(ROBOT_SCHEMA)
     root = document.root
     for name, leg_type in root["leg_types"].items():
-        document.check(_leg_type_schema(MECHANISMS[leg_type["mechanism"]]), "leg_types", name)
+        document.check(_leg_type_schema(MECHANISMS[leg_type["mechanism"]]()), "leg_types", name)
     units = {k: UNITS[k][v] for k, v in root["units"].items()} | {"ratio": 1.0}
     mechanisms = {name: _mechanism(document, name, units) for name in root["leg_types"]}
     legs = {name: _leg(document, name, mechanisms, units) for name in root["legs"]}
@@ -193,15 +193,16 @@ def robot_from_document(document: Document) -> Robot:
 def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any:
     leg_type = document.node("leg_types", name)
     mechanism = MECHANISMS[leg_type["mechanism"]]
+    example = mechanism()
     geometry = {
         f.name: float(leg_type["geometry"][f.name]) * units[f.metadata["dimension"]]
         for f in geometry_parameters(mechanism)
     }
 
-    def ranges(key: str, joints: Sequence[Joint]) -> tuple[tuple[float, float], ...]:
+    def ranges(key: str, joints: Sequence[Joint | Excursion]) -> tuple[tuple[float, float], ...]:
         pairs = []
         for joint in joints:
-            scale = units["angle" if joint.type == "revolute" else "length"]
+            scale = units[joint.dimension]
             lower, upper = leg_type[key][joint.name]
             if lower > upper:
                 message = f"{[lower, upper]}: lower must be <= upper"
@@ -212,8 +213,8 @@ def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any
     try:
         return mechanism(
             **geometry,
-            joint_ranges=ranges("joint_limits", mechanism.joints),
-            passive_joint_ranges=ranges("passive_joint_limits", mechanism.passive_joints),
+            joint_ranges=ranges("joint_limits", example.joints),
+            passive_joint_ranges=ranges("passive_joint_limits", example.excursions),
         )
     except GeometryError as error:
         message = f"cannot be assembled: {error}"
@@ -272,7 +273,7 @@ def _leg(
 def _check_unique_joints(document: Document, legs: Mapping[str, Leg]) -> None:
     owner: dict[str, str] = {}
     for leg in legs.values():
-        for joint in leg.joint_names:
+        for joint in (*leg.joint_names, *leg.passive_joint_names):
             if joint in owner:
                 message = f"joint name {joint!r} is already used by leg {owner[joint]!r}"
                 raise document.error(message, "legs", leg.name)

@@ -178,4 +178,5 @@ class Mirrored(Mechanism):
 
 
 def _reflected(posture: Posture) -> Posture:
-    return posture._replace(foot_position=posture.foot_position * VECTOR)
+    q, closure, foot, status = posture
+    return Posture(q, closure, foot * VECTOR, status)

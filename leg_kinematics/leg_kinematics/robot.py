@@ -89,6 +89,11 @@ class Leg:
         return cls(mechanism.name, mechanism.name, mechanism, mount, mechanism.name, joints, rows)
 
     @property
+    def passive_joint_names(self) -> tuple[str, ...]:
+        """Names of the passive joints in the robot, in the mechanism's order: <leg>_<joint>."""
+        return tuple(f"{self.name}_{joint.name}" for joint in self.mechanism.passive_joints)
+
+    @property
     def mirrored(self) -> bool:
         """Whether the mechanism is the mirror image of its geometry."""
         return isinstance(self.mechanism, Mirrored)

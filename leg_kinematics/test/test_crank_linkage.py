@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from leg_kinematics import GeometryError, Mechanism, ShapeError, Status, UnknownNameError
+from leg_kinematics import GeometryError, Status
 from leg_kinematics.geometry import geometry_parameters
 from leg_kinematics.mechanisms.six_bar import SixBar
 from leg_kinematics.mechanisms.theo_jansen import TheoJansen
@@ -39,19 +39,6 @@ def distances(linkage, first, second):
 
 def angle_between(first, second):
     return np.abs(np.angle(np.exp(1j * (first - second))))
-
-
-def solved(leg, assembly_mode=""):
-    """Postures with a foot, well away from dead points."""
-    posture = leg.forward(TURN, assembly_mode)
-    good = (posture.status == Status.OK) & (np.abs(posture.closure) > 0.02).all(axis=-1)
-    return type(posture)(*(field[good] for field in posture))
-
-
-@legs
-def test_leg_has_every_member_of_the_protocol(leg):
-    members = [m for m in dir(Mechanism) if not m.startswith("_")]
-    assert all(hasattr(leg, member) for member in members)
 
 
 @legs
@@ -91,58 +78,6 @@ def test_the_crank_turns_all_the_way_round_and_the_foot_is_g(leg):
     assert (posture.status == Status.OK).all()
     np.testing.assert_array_equal(posture.foot_position, leg.linkage(posture).points[:, -1])
     np.testing.assert_array_equal(posture.foot_position[:, 1], 0.0)
-
-
-@legs
-def test_a_batch_is_its_crank_angles_one_by_one(leg):
-    odd = [math.nan, math.inf, -math.inf, 1e300]
-    q = np.append(np.linspace(-4.0, 4.0, 131), odd)[:, None]  # more than two blocks
-    q = np.random.default_rng(5).permutation(q)
-    for mode in leg.assembly_modes[:2]:
-        posture = leg.forward(q, mode)
-        points = leg.linkage(posture).points
-        for i in range(len(q)):
-            alone = leg.forward(q[i], mode)
-            for field, one in zip(posture, alone, strict=True):
-                np.testing.assert_array_equal(field[i], one)
-            np.testing.assert_array_equal(points[i], leg.linkage(alone).points)
-
-
-@legs
-def test_jacobian_and_acceleration_are_derivatives(leg):
-    step = 1e-6
-    for mode in (leg.assembly_modes[0], leg.assembly_modes[1]):
-        posture = solved(leg, mode)
-        q = posture.joint_positions
-        before, after = leg.forward(q - step, mode), leg.forward(q + step, mode)
-        slope = (after.foot_position - before.foot_position) / (2 * step)
-        jacobian = leg.jacobian(posture)
-        assert jacobian.shape == (len(q), 3, 1)
-        scale = np.abs(jacobian).max()
-        np.testing.assert_allclose(jacobian[..., 0], slope, rtol=0, atol=2e-7 * scale)
-        slope = (leg.jacobian(after) - leg.jacobian(before))[..., 0] / (2 * step)
-        found = leg.acceleration(posture, [2.0], [0.0])
-        np.testing.assert_allclose(found, 4.0 * slope, rtol=0, atol=2e-6 * np.abs(found).max())
-        found = leg.acceleration(posture, [0.0], [3.0])
-        np.testing.assert_allclose(found, 3.0 * jacobian[..., 0], rtol=1e-14)
-
-
-@legs
-def test_angular_jacobian_is_the_turning_of_the_foot_link(leg):
-    step = 1e-6
-    posture = solved(leg)
-
-    def angle(q):
-        linkage = leg.linkage(leg.forward(q))
-        index = linkage.names.index
-        bar = linkage.points[:, index("F")] - linkage.points[:, index("C")]
-        return np.arctan2(bar[:, 0], bar[:, 2])  # about +y of the leg frame
-
-    q = posture.joint_positions
-    slope = np.angle(np.exp(1j * (angle(q + step) - angle(q - step)))) / (2 * step)
-    found = leg.angular_jacobian(posture)
-    np.testing.assert_allclose(found[:, 1, 0], slope, rtol=1e-6, atol=1e-6)
-    np.testing.assert_array_equal(found[:, ::2], 0.0)
 
 
 @legs
@@ -243,21 +178,6 @@ def test_inverse_answers_within_the_range_of_the_crank(leg):
     assert (back.joint_positions <= 10.0 + 2 * math.pi + 1e-9).all()
 
 
-@turning
-def test_passive_joints_start_at_zero_and_limit(leg):
-    excursions = leg.passive_joint_positions(leg.forward(TURN))
-    assert excursions.shape == (len(TURN), len(leg.passive_joints))
-    np.testing.assert_array_equal(leg.passive_joint_positions(leg.initial_posture), 0.0)
-    joint = [j.name for j in leg.passive_joints].index("f")
-    reach = 0.5 * np.abs(excursions[:, joint]).max()
-    ranges = list(leg.passive_joint_ranges)
-    ranges[joint] = (-reach, reach)
-    status = replace(leg, passive_joint_ranges=tuple(ranges)).forward(TURN).status
-    wanted = np.where(np.abs(excursions[:, joint]) > reach, Status.PASSIVE_JOINT_LIMIT, Status.OK)
-    np.testing.assert_array_equal(status, wanted)
-    assert len(np.unique(status)) == 2
-
-
 def test_a_leg_that_swings_is_unreachable_where_its_bars_do_not_close():
     posture = SWINGING.forward(TURN)
     open_ = posture.status == Status.UNREACHABLE
@@ -285,40 +205,12 @@ def test_mirror_image_is_the_leg_itself(leg):
 
 
 @turning
-def test_leading_axes_are_kept(leg):
-    posture = leg.forward(np.zeros((2, 3, 1)))
-    assert posture.foot_position.shape == (2, 3, 3)
-    assert posture.status.shape == (2, 3)
-    assert leg.linkage(posture).points.shape == (2, 3, len(leg.point_names), 3)
-    assert leg.inverse(posture.foot_position).joint_positions.shape == (2, 3, 1)
-    assert leg.crank_angles_at(0.0).ndim == 1
-    assert leg.acceleration(posture, np.zeros((3, 1)), [0.0]).shape == (2, 3, 3)
-    assert leg.forward(np.zeros((0, 1))).foot_position.shape == (0, 3)
-
-
-@turning
-def test_misuse_raises(leg):
-    with pytest.raises(ShapeError, match="joint_positions"):
-        leg.forward(np.zeros(2))
-    with pytest.raises(ShapeError, match="foot_position"):
-        leg.inverse(np.zeros(2))
-    with pytest.raises(UnknownNameError, match="walking"):
-        leg.forward([0.0], "sideways")
-
-
-@turning
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"crank_length": 0.0}, "crank_length .* must be > 0"),
-        ({"frame_length": -1.0}, "frame_length .* must be > 0"),
-        ({"frame_angle": math.nan}, "frame_angle .* must be finite"),
         ({"foot_brace": 50.0}, "rigid triangle C-F-G does not close"),
         ({"foot_bar": 1e-9, "foot_brace": 1e-9}, "rigid triangle C-F-G does not close"),
         ({"frame_length": 30.0}, "do not meet in C"),
-        ({"joint_ranges": ((1.0, 0.0),)}, "joint_ranges of crank"),
-        ({"joint_ranges": ((0.0, math.nan),)}, "joint_ranges of crank"),
-        ({"passive_joint_ranges": ()}, "passive_joint_ranges must be"),
     ],
 )
 def test_impossible_geometry_is_named(leg, change, message):
@@ -350,20 +242,11 @@ def test_any_geometry_raises_a_geometry_error_or_computes(data):
     hnp.arrays(np.float64, (4, 3), elements=st.floats(allow_nan=True, allow_infinity=True)),
     st.sampled_from([JANSEN, SIX_BAR, SWINGING]),
 )
-def test_arbitrary_numbers_never_raise_and_ok_is_never_nan(numbers, leg):
+def test_passes_of_arbitrary_numbers_are_found_or_nan(numbers, leg):
     for mode in leg.assembly_modes[:3]:
-        for posture in (leg.forward(numbers[:, :1], mode), leg.inverse(numbers, mode)):
-            ok = posture.status == Status.OK
-            for field in posture[:3]:
-                assert np.isfinite(field[ok]).all()
-            assert np.isfinite(leg.jacobian(posture)[ok]).all()
-            leg.angular_jacobian(posture)
-            leg.passive_joint_positions(posture)
-            leg.acceleration(posture, numbers[:, 1:2], numbers[:, 2:])
-            leg.linkage(posture)
-        invalid = ~np.isfinite(numbers[:, 0])
-        assert (leg.forward(numbers[:, :1], mode).status[invalid] == Status.INVALID_INPUT).all()
-        invalid = ~np.isfinite(numbers).all(axis=-1)
-        assert (leg.inverse(numbers, mode).status[invalid] == Status.INVALID_INPUT).all()
-        leg.nearest_crank_angles(numbers, mode)
-        leg.crank_angles_at(numbers, mode)
+        passes = leg.nearest_crank_angles(numbers, mode)
+        known = np.isfinite(numbers).all(axis=-1)
+        missing = np.isnan(passes.crank_angles)
+        np.testing.assert_array_equal(missing[known], np.isnan(passes.distances[known]))
+        angles = leg.crank_angles_at(numbers, mode)
+        assert np.isnan(angles[~np.isfinite(numbers)]).all()

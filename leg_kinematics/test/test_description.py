@@ -44,6 +44,19 @@ def test_hexapod_has_six_legs_mirrored_left_to_right():
     np.testing.assert_allclose(q.joint_positions, q_left.joint_positions, atol=1e-14)
 
 
+def test_joint_names_are_unique_in_a_robot_passive_ones_included():
+    for robot in map(load_robot, ("hexapod", "quadruped", "walker", "gantry")):
+        names = [
+            name
+            for leg in robot.legs.values()
+            for name in leg.joint_names + leg.passive_joint_names
+        ]
+        assert len(set(names)) == len(names)
+        for leg in robot.legs.values():
+            joints = [joint.name for joint in leg.mechanism.passive_joints]
+            assert leg.passive_joint_names == tuple(f"{leg.name}_{joint}" for joint in joints)
+
+
 @pytest.mark.parametrize("robot", ["hexapod", "quadruped", "walker"])
 def test_axes_of_legs_are_those_of_the_body(robot):
     for leg in load_robot(robot).legs.values():
@@ -115,6 +128,11 @@ MISTAKES = {
     "short vector": ("position: [450, 300, 0]", "position: [450, 300, 0], rpy: [0, 0]", ["legs.left_front.mount.rpy", "short"]),
     "NaN in a mount": ("[450, 300, 0]", "[450, .nan, 0]", ["mount.position.1", "nan"]),
     "text for a boolean": ("mirrored: true", "mirrored: maybe", ["mirrored", "boolean"]),
+    "joint name of a passive joint": (
+        "type: optimised\n    mount: {position: [450",
+        "type: optimised\n    joint_names: {crank_1: left_front_r1}\n    mount: {position: [450",
+        ["'left_front_r1'", "already used", "left_front"],
+    ),
     "joint name used twice": (
         "type: optimised\n    mount: {position: [450",
         "type: optimised\n    joint_names: {crank_1: m, crank_2: m}\n    mount: {position: [450",

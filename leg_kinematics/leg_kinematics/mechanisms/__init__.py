@@ -11,9 +11,5 @@ from leg_kinematics.mechanisms.six_bar import SixBar
 from leg_kinematics.mechanisms.theo_jansen import TheoJansen
 
 MECHANISMS: dict[str, type[Any]] = {
-    ParallelDrive.name: ParallelDrive,
-    SixBar.name: SixBar,
-    TheoJansen.name: TheoJansen,
-    DoubleRhombus.name: DoubleRhombus,
-    GantryHybrid.name: GantryHybrid,
+    kind.name: kind for kind in (ParallelDrive, SixBar, TheoJansen, DoubleRhombus, GantryHybrid)
 }

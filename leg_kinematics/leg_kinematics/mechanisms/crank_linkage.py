@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.arrays import FloatArray, as_array, as_matching, wrapped_angles
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned
 from leg_kinematics.kernels.blocks import load, put, store
@@ -290,6 +290,11 @@ def mode_sides(walking: Sequence[float]) -> FloatArray:
     return np.array(list(flips), dtype=np.float64) * np.asarray(walking)
 
 
+def _direction(vectors: FloatArray) -> FloatArray:
+    """Return the direction of vectors (..., 3) in the linkage's plane, whose X is -x [rad]."""
+    return np.arctan2(vectors[..., 2], -vectors[..., 0])
+
+
 class CrankLinkage(Dimensioned):
     """Base of the mechanisms with one crank; a subclass is a frozen dataclass of its geometry.
 
@@ -310,6 +315,7 @@ class CrankLinkage(Dimensioned):
     dyads: ClassVar[tuple[Dyad, ...]]
     triangles: ClassVar[tuple[Triangle, ...]]
     pivots: ClassVar[tuple[Pivot, ...]]
+    crank_points: ClassVar[tuple[str, ...]] = ("A", "B")  # points of the crank's body
     bars: ClassVar[tuple[tuple[str, ...], ...]]
 
     crank: ClassVar[float] = 1.0  # A B, the unit of all ratios
@@ -389,7 +395,7 @@ class CrankLinkage(Dimensioned):
         posture = Posture(q, closure, foot, status)
         limited = np.ptp(self.passive_joint_limits, axis=-1) < TURN - LIMIT_TOLERANCE
         if limited.any():
-            excursions = self.passive_joint_positions(posture)[..., limited]
+            excursions = self.passive_joint_excursions(posture)[..., limited]
             lower, upper = self.passive_joint_limits[limited].T
             outside = (excursions < lower - LIMIT_TOLERANCE) | (
                 excursions > upper + LIMIT_TOLERANCE
@@ -598,25 +604,44 @@ class CrankLinkage(Dimensioned):
         return result
 
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
-        """Angles of the passive joints, as excursions from the initial posture (..., p) [rad].
+        """Angles between the bars at each of `pivots` (..., p) [rad].
 
-        Counter-clockwise in the linkage's plane, in [-pi, pi).
+        From the direction of the first bar's far end to that of the second's, in the sense in which
+        the crank turns. Those at the crank's body follow it over whole turns; the other bars are
+        taken to stay within half a turn of where they are in the initial posture.
         """
-        angles = self._pivot_angles(posture.joint_positions, posture.closure)
-        excursions = angles - self._pivot_angles(np.zeros(1), self.sides[0])
-        wrapped: FloatArray = excursions - TURN * np.floor(excursions / TURN + 0.5)
-        return wrapped
+        first, second = self._bar_directions(posture.joint_positions, posture.closure)
+        first_rest, second_rest = self._rest_directions
+        turned = wrapped_angles(first - first_rest)
+        on_crank = [{p.point, p.first} <= set(self.crank_points) for p in self.pivots]
+        turned[..., on_crank] = posture.joint_positions
+        return self._rest_angles + wrapped_angles(second - second_rest) - turned
 
-    def _pivot_angles(self, q: FloatArray, sides: FloatArray) -> FloatArray:
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
+        """Excursions of the passive joints from the initial posture (..., p) [rad].
+
+        In [-pi, pi): a range of a whole turn is no limit.
+        """
+        return wrapped_angles(self.passive_joint_positions(posture) - self._rest_angles)
+
+    @cached_property
+    def _rest_angles(self) -> FloatArray:
+        """Positions of the passive joints in the initial posture (p,) [rad]."""
+        first, second = self._rest_directions
+        return wrapped_angles(second - first)
+
+    @cached_property
+    def _rest_directions(self) -> tuple[FloatArray, FloatArray]:
+        return self._bar_directions(np.zeros(1), self.sides[0])
+
+    def _bar_directions(self, q: FloatArray, sides: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the directions of both bars at each pivot, counter-clockwise from X (..., p)."""
         points = self._points(q, sides)
         index = self.point_names.index
         pivot = points[..., [index(p.point) for p in self.pivots], :]
         first = points[..., [index(p.first) for p in self.pivots], :] - pivot
         second = points[..., [index(p.second) for p in self.pivots], :] - pivot
-        # cross and dot in the linkage's plane, whose X is -x
-        cross = first[..., 2] * second[..., 0] - first[..., 0] * second[..., 2]
-        dot = first[..., 0] * second[..., 0] + first[..., 2] * second[..., 2]
-        return np.arctan2(cross, dot)
+        return _direction(first), _direction(second)
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them."""

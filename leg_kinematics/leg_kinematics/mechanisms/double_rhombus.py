@@ -40,13 +40,13 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
-from leg_kinematics.mechanism import Joint, Linkage, Posture
+from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
@@ -188,7 +188,7 @@ def planar_rates(g: Geometry, beta: float, alpha: float) -> tuple[float, float, 
 
 @scalar
 def passive_angles(g: Geometry, closure: FloatArray, angles: FloatArray) -> None:
-    """Fill the angles of the passive joints, in the order of `DoubleRhombus.passive_joints`."""
+    """Fill the angles of the passive joints, in the order of `DoubleRhombus.excursions`."""
     beta, alpha, psi_s = closure[0], closure[1], closure[2]
     abx, abz, dcx, dcz = cylinder_vectors(g, beta, alpha)
     upper, lower = math.atan2(abz, abx), math.atan2(dcz, dcx)
@@ -371,6 +371,42 @@ def _levers(geometry, closure, levers):  # type: ignore[no-untyped-def]
 
 FLIPPABLE = ("rhombus", "upper", "lower")
 
+
+class Pin(NamedTuple):
+    """A passive joint: its position is `rate` times an angle of `passive_angles`, plus an offset.
+
+    Attributes:
+        name: Name of the joint.
+        angle: Index of the angle.
+        rate: Position by the angle.
+        offset: Position where the angle is zero [rad].
+    """
+
+    name: str
+    angle: int
+    rate: float
+    offset: float
+
+
+PINS = (
+    Pin("hip_upper_crank", 0, 1.0, 0.0),
+    Pin("hip_lower_crank", 1, 1.0, 0.0),
+    Pin("f", 2, 1.0, -math.pi),
+    Pin("e", 2, -1.0, math.pi),
+    Pin("g", 2, -1.0, 0.0),
+    Pin("h", 2, 1.0, -math.pi),
+    Pin("j", 2, -1.0, math.pi),
+    Pin("i", 2, -1.0, 0.0),
+    Pin("foot", 2, -0.5, 0.0),
+    Pin("upper_pin_a", 3, 1.0, -math.pi),
+    Pin("upper_pin_b", 4, 1.0, 0.0),
+    Pin("lower_pin_c", 5, 1.0, 0.0),
+    Pin("lower_pin_d", 6, 1.0, -math.pi),
+    Pin("swing_axis", 7, 1.0, 0.0),
+    Pin("swing_pin_body", 8, 1.0, -math.pi - SWING_BODY_PIN),
+    Pin("swing_pin_leg", 9, 1.0, 0.0),
+)
+
 # The initial posture: phi = 0, theta = 45°, psi_s = 0.
 INITIAL_CLOSURE = (1.25 * math.pi, 1.75 * math.pi, 0.0)
 
@@ -398,8 +434,9 @@ class DoubleRhombus(Dimensioned):
         Joint("lower_cylinder", "prismatic"),
         Joint("swing_cylinder", "prismatic"),
     )
-    passive_joints: ClassVar[tuple[Joint, ...]] = tuple(
-        Joint(n)
+    passive_joints: ClassVar[tuple[Joint, ...]] = tuple(Joint(pin.name) for pin in PINS)
+    excursions: ClassVar[tuple[Excursion, ...]] = tuple(
+        Excursion(n)
         for n in (
             *("hip_upper_crank", "hip_lower_crank", "rhombus"),
             *("upper_pin_a", "upper_pin_b", "lower_pin_c", "lower_pin_d"),
@@ -547,6 +584,28 @@ class DoubleRhombus(Dimensioned):
         return _angular_jacobian(self._geometry, posture.closure)
 
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Angles between the bars at the pins and axes (..., 16) [rad].
+
+        At a pin, from one bar's far end to that of the other: in the leg's plane from the walking
+        direction upwards, across it in the sense of the side swing psi_s.
+
+            hip_upper_crank C-O-F    hip_lower_crank C-O-E    foot H-I-O
+            f O-F-G    e O-E-G    g F-G-E    h G-H-I    j G-J-I    i H-I-J
+            upper_pin_a O-A-B    upper_pin_b from C O to B A
+            lower_pin_d O-D-C    lower_pin_c O-C-D
+            swing_pin_body O-K-L    swing_pin_leg O-L-K
+
+        The foot's body is in line with O I; swing_axis is psi_s.
+        """
+        angles = self.passive_joint_excursions(posture)[..., [pin.angle for pin in PINS]]
+        return self._pin_rest + angles * [pin.rate for pin in PINS]
+
+    @cached_property
+    def _pin_rest(self) -> FloatArray:
+        """Positions of the passive joints in the initial posture (16,) [rad]."""
+        return wrapped_angles([self._rest[pin.angle] * pin.rate + pin.offset for pin in PINS])
+
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
         """Excursions of the passive joints from the initial posture (..., 10) [rad].
 
         Cranks AOF and DOE about the hip O (beta, alpha); the opening 2 theta, which all joints of

@@ -46,7 +46,7 @@ from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.scalars import within, wrapped
-from leg_kinematics.mechanism import Joint, Linkage, Posture
+from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
 from leg_kinematics.status import Status
 
@@ -239,7 +239,7 @@ def on_branch(g: Geometry, branch: Branch, v: Levers) -> bool:
 
 @scalar
 def passive_state(g: Geometry, v: Levers, closure: FloatArray, state: FloatArray) -> None:
-    """Fill the state of the passive joints, in the order of `GantryHybrid.passive_joints`."""
+    """Fill the state of the passive joints, in the order of `GantryHybrid.excursions`."""
     x, z, beta = closure[0], closure[1], closure[2]
     rod_y = g.e * math.cos(beta) - g.d
     along = math.atan2(v.km1, rod_y)
@@ -439,6 +439,10 @@ def _levers(geometry, q, closure, shape, result):  # type: ignore[no-untyped-def
 
 FLIPPABLE = Branch._fields
 
+# Which of `passive_state` each passive joint measures, and in which sense.
+PIN_STATES = [0, 0, 1, 1, 2, 3, 5, 5, 4, 8]
+PIN_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0])
+
 
 def _range_deg(lower: float, upper: float) -> tuple[float, float]:
     return math.radians(lower), math.radians(upper)
@@ -461,10 +465,16 @@ class GantryHybrid(Dimensioned):
         Joint(n, "prismatic") for n in ("s1", "s2", "s3", "s4")
     )
     passive_joints: ClassVar[tuple[Joint, ...]] = (
-        *(Joint("bar_a"), Joint("bar_b"), Joint("platform_hinge")),
-        *(Joint("rod_slide_along"), Joint("rod_platform_along"), Joint("rod_across")),
-        *(Joint("shaft_base_bend"), Joint("shaft_platform_bend")),
+        *(Joint("bar_a_slide"), Joint("bar_a_hinge"), Joint("bar_b_slide"), Joint("bar_b_hinge")),
+        *(Joint("platform_hinge"), Joint("rod_slide_along"), Joint("rod_slide_across")),
+        *(Joint("rod_platform_across"), Joint("rod_platform_along")),
         Joint("shaft_sleeve", "prismatic"),
+    )
+    excursions: ClassVar[tuple[Excursion, ...]] = (
+        *(Excursion("bar_a"), Excursion("bar_b"), Excursion("platform_hinge")),
+        *(Excursion("rod_slide_along"), Excursion("rod_platform_along"), Excursion("rod_across")),
+        *(Excursion("shaft_base_bend"), Excursion("shaft_platform_bend")),
+        Excursion("shaft_sleeve", "length"),
     )
     closure_names: ClassVar[tuple[str, ...]] = ("platform_x", "platform_z", "platform_tilt")
     assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("initial", FLIPPABLE)
@@ -646,6 +656,23 @@ class GantryHybrid(Dimensioned):
         return result
 
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Angles of the bars and rod at their ends, length of the shaft (..., 10) [rad, last m].
+
+            bar_a_slide, bar_b_slide      at A'', B'': from X to the bar, towards Z
+            bar_a_hinge, bar_b_hinge      at A', B': from the bar to X, in the same sense
+            platform_hinge                beta
+            rod_slide_along               at C'', about X: from Y to the rod's projection
+            rod_slide_across              at C'': from there to the rod, towards X
+            rod_platform_across           at C': from the rod back into the plane across X
+            rod_platform_along            at C', about X: from the arm O''C' to the rod's projection
+            shaft_sleeve                  F F'
+
+        The forks of the auxiliary shaft turn with its input, which is no joint of the mechanism.
+        """
+        state = self._rest + self.passive_joint_excursions(posture)
+        return state[..., PIN_STATES] * PIN_SENSES
+
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
         """Excursions of the passive joints from the initial posture (..., 9) [rad, last m].
 
         Inclinations of the bars A and B, which the pins at both their ends share; the hinge A'B' of

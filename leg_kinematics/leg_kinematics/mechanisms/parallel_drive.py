@@ -32,7 +32,7 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
@@ -40,7 +40,7 @@ from leg_kinematics.kernels.blocks import BLOCK, get3, load, put, store, store_c
 from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import arctan2, included_angle, swing_plane, within, wrapped
-from leg_kinematics.mechanism import Joint, Linkage, Posture
+from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.walking_axes import in_leg_frame, in_walking_axes, leg_vectors
 from leg_kinematics.status import Status
 
@@ -297,11 +297,19 @@ def drive_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
 
 @inlined
 def walking_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
-    """Tell whether the pantograph lies inside the branch, seen from the foot and from S."""
+    """Tell whether the pantograph lies inside the branch, seen from the foot and from S.
+
+    Both must hang below the axis of the swing, each on its own: on the axis they do not swing.
+    """
     lever_y, lever_z = pantograph_lever(g, p.c2, p.s2)
     from_foot = p.s2 * p.c1 - p.c2 * p.s1
     from_drive = lever_z * p.c1 - lever_y * p.s1
-    return (from_foot * branch.knee > 0.0) & (from_drive * branch.knee > 0.0)
+    return (
+        (from_foot * branch.knee > 0.0)
+        & (from_drive * branch.knee > 0.0)
+        & ((g.l4 + g.l5 + g.l7) * p.s1 + g.l6 * p.s2 < 0.0)
+        & (g.l4 * p.s1 + lever_z < 0.0)
+    )
 
 
 @scalar
@@ -761,6 +769,7 @@ ACROSS, CONES = [1, 3, 5], [6, 7, 8]  # passive joints told by a sine and by a c
 RANGE = math.radians(21.0)
 PASSIVE_RANGE = math.radians(45.0)
 FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
+UNIVERSAL_JOINTS = ("u1_along", "u1_across", "u2_along", "u2_across", "u3_along", "u3_across")
 
 
 @dataclass(frozen=True)
@@ -776,11 +785,10 @@ class ParallelDrive(Dimensioned):
     name: ClassVar[str] = "parallel_drive"
     joints: ClassVar[tuple[Joint, ...]] = (Joint("crank_1"), Joint("crank_2"), Joint("crank_3"))
     passive_joints: ClassVar[tuple[Joint, ...]] = tuple(
-        Joint(n)
-        for n in (
-            *("u1_along", "u1_across", "u2_along", "u2_across", "u3_along", "u3_across"),
-            *("s1_cone", "s2_cone", "s_cone"),
-        )
+        Joint(n) for n in (*UNIVERSAL_JOINTS, "hip_swing", "hip_thigh", "r1", "r2", "r3", "r5")
+    )
+    excursions: ClassVar[tuple[Excursion, ...]] = tuple(
+        Excursion(n) for n in (*UNIVERSAL_JOINTS, "s1_cone", "s2_cone", "s_cone")
     )
     closure_names: ClassVar[tuple[str, ...]] = (
         *("platform_elevation", "platform_tilt"),
@@ -957,6 +965,35 @@ class ParallelDrive(Dimensioned):
         return twist
 
     def passive_joint_positions(self, posture: Posture) -> FloatArray:
+        """Angles of the universal joints, the hip and the pantograph's pins (..., 12) [rad].
+
+            u1_along, u2_along, u3_along       at U_i, about the crank's axis: from the crank to the
+                                               projection of the rod, or of the platform's U3 G
+            u1_across, u2_across, u3_across    from there to the rod or U3 G, towards crank 1's side
+            hip_swing                          th3, of the pantograph's plane from the vertical
+            hip_thigh                          th1, in that plane from forward to the thigh H R1
+            r1 H-R1-R2    r2 R1-R2-R5          in that plane from one bar's far end to that of the
+            r3 R1-R3-R5   r5 R3-R5-C           other
+
+        In the plane angles count in the sense of the cranks.
+        """
+        universal = self.passive_joint_excursions(posture)[..., : len(UNIVERSAL_JOINTS)]
+        universal = universal + np.stack([self._rest[:3], self._across_rest], axis=-1).ravel()
+        thigh, bend = self._pantograph_angles(posture.closure)
+        thigh_rest, bend_rest = self._pantograph_angles(self._initial[0])
+        thigh = thigh_rest + wrapped_angles(thigh - thigh_rest)
+        bend = bend_rest + wrapped_angles(bend - bend_rest)
+        hip = [posture.closure[..., 4], thigh]
+        return np.concatenate(
+            [universal, np.stack([*hip, bend, -bend, bend, -bend], axis=-1)], axis=-1
+        )
+
+    def _pantograph_angles(self, closure: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the angles H R1 of the thigh and H-R1-R2 in the pantograph's plane (...) [rad]."""
+        thigh, link = closure[..., 2], closure[..., 3]
+        return thigh, wrapped_angles(link - thigh - np.pi)
+
+    def passive_joint_excursions(self, posture: Posture) -> FloatArray:
         """Excursions of the passive joints from the initial posture (..., 9) [rad].
 
         Universal joints by their two axes (along: the axis parallel to the crank's; across), the
@@ -985,6 +1022,7 @@ class ParallelDrive(Dimensioned):
         parts = leg_vectors(jacobian[..., :3]), leg_vectors(jacobian[..., 3:])
         return np.concatenate(parts, axis=-1)
 
+    @np.errstate(invalid="ignore")  # joints that are not finite have no points
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them."""
         g = Geometry(*self._geometry)

@@ -292,6 +292,7 @@ class SixBar(CrankLinkage):
         Pivot("c_foot", "C", "D", "F"),
         Pivot("f", "F", "C", "E"),
     )
+    crank_points: ClassVar[tuple[str, ...]] = ("A", "B", "E")
     bars: ClassVar[tuple[tuple[str, ...], ...]] = (
         *(("A", "B", "E", "A"), ("B", "C"), ("C", "D"), ("E", "F"), ("C", "F", "G", "C")),
     )

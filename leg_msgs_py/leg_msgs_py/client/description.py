@@ -43,8 +43,12 @@ class LegDescription(NamedTuple):
         joint_limits: Least and greatest position (n, 2) [rad or m].
         effort_units: Units of effort (n).
         effort_limits: Least and greatest effort (n, 2) [N.m or N].
-        passive_joint_names: Names of the passive joints (p).
-        passive_joint_limits: Least and greatest excursion (p, 2) [rad or m].
+        passive_joint_names: Names of the passive joints that have a position (p).
+        passive_joint_types: "revolute" or "prismatic" (p).
+        passive_joint_units: Units of position (p).
+        excursion_names: Names of the excursions of passive joints that are limited (e).
+        excursion_units: Their units (e).
+        excursion_limits: Least and greatest excursion (e, 2) [rad or m].
         task_coordinates: Names of the foot's coordinates (t).
         task_units: Their units (t).
         assembly_modes: Names of the branches of the closed chain; the first is the default.
@@ -69,7 +73,11 @@ class LegDescription(NamedTuple):
     effort_units: tuple[str, ...]
     effort_limits: FloatArray
     passive_joint_names: tuple[str, ...]
-    passive_joint_limits: FloatArray
+    passive_joint_types: tuple[str, ...]
+    passive_joint_units: tuple[str, ...]
+    excursion_names: tuple[str, ...]
+    excursion_units: tuple[str, ...]
+    excursion_limits: FloatArray
     task_coordinates: tuple[str, ...]
     task_units: tuple[str, ...]
     assembly_modes: tuple[str, ...]
@@ -105,7 +113,11 @@ class LegDescription(NamedTuple):
             effort_units=tuple(message.joint_effort_units),
             effort_limits=pairs(message.joint_effort_lower, message.joint_effort_upper),
             passive_joint_names=tuple(message.passive_joint_names),
-            passive_joint_limits=pairs(message.passive_joint_lower, message.passive_joint_upper),
+            passive_joint_types=tuple(message.passive_joint_types),
+            passive_joint_units=tuple(message.passive_joint_position_units),
+            excursion_names=tuple(message.excursion_names),
+            excursion_units=tuple(message.excursion_units),
+            excursion_limits=pairs(message.excursion_lower, message.excursion_upper),
             task_coordinates=tuple(message.task_coordinates),
             task_units=tuple(message.task_units),
             assembly_modes=tuple(message.assembly_modes),

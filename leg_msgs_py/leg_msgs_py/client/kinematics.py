@@ -34,6 +34,9 @@ class JointPositions(NamedTuple):
         assembly_modes: The modes that were solved (M).
         passive_joint_positions: Passive joints (..., p) [rad or m], (..., 0) unless asked for.
         passive_joint_names: Names of the passive joints (p), empty unless asked for.
+        excursions: How far passive joints are from the initial pose (..., e) [rad or m], which
+            limits bound; (..., 0) unless asked for.
+        excursion_names: Names of the excursions (e), empty unless asked for.
     """
 
     joint_positions: FloatArray
@@ -42,6 +45,8 @@ class JointPositions(NamedTuple):
     assembly_modes: tuple[str, ...]
     passive_joint_positions: FloatArray
     passive_joint_names: tuple[str, ...]
+    excursions: FloatArray
+    excursion_names: tuple[str, ...]
 
 
 class Jacobians(NamedTuple):
@@ -106,7 +111,7 @@ def inverse_kinematics(
         positions: Foot (..., t) [m].
         frame: Frame of the positions: the leg's own ("" or its name) or the base frame.
         assembly_mode: Branch of the closed chain; "" is the default, "ALL" is every one.
-        passive_joints: Whether to return the passive joints, too.
+        passive_joints: Whether to return the passive joints and their excursions, too.
     """
     feet = points("positions", positions)
     request = InverseKinematics.Request(
@@ -120,7 +125,8 @@ def inverse_kinematics(
     def decode(response: Any) -> JointPositions:
         modes = tuple(response.assembly_modes)
         status = feet.status(response, (len(modes),) if assembly_mode == "ALL" else ())
-        names, passive = tuple(response.joint_names), tuple(response.passive_joint_names)
+        names = tuple(response.joint_names)
+        passive, excursions = tuple(response.passive_joint_names), tuple(response.excursion_names)
         return JointPositions(
             joint_positions=from_field(response.joint_positions, (*status.shape, len(names))),
             status=status,
@@ -130,6 +136,8 @@ def inverse_kinematics(
                 response.passive_joint_positions, (*status.shape, len(passive))
             ),
             passive_joint_names=passive,
+            excursions=from_field(response.excursions, (*status.shape, len(excursions))),
+            excursion_names=excursions,
         )
 
     return Request(request, decode, feet)

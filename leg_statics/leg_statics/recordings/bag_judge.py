@@ -356,7 +356,7 @@ class BagJudge:
     ) -> Judgement:
         positions, mechanism = states.joint_positions[k], leg.mechanism
         posture = mechanism.forward(positions)
-        excursions = mechanism.passive_joint_positions(posture)
+        excursions = mechanism.passive_joint_excursions(posture)
         unknown: FloatArray = np.full(positions.shape, np.nan)
         force: FloatArray = np.full((len(rows), 3), np.nan)
         required = unknown

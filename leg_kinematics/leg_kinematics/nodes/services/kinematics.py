@@ -51,8 +51,11 @@ def inverse_kinematics(host: Host, request: Any, response: Any) -> None:
     response.status = to_field([p.status for p in postures], np.uint8)
     if request.include_passive_joints:
         passive = [mechanism.passive_joint_positions(p) for p in postures]
-        response.passive_joint_names = [joint.name for joint in mechanism.passive_joints]
+        response.passive_joint_names = list(leg.passive_joint_names)
         response.passive_joint_positions = to_field(passive)
+        excursions = [mechanism.passive_joint_excursions(p) for p in postures]
+        response.excursion_names = [excursion.name for excursion in mechanism.excursions]
+        response.excursions = to_field(excursions)
 
 
 @service(GetJacobian)
