@@ -67,7 +67,7 @@ def test_a_search_finds_designs_and_a_robot(client, tmp_path):
 def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_path):
     progress = []
     work = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=progress.append)
-    wait_for(lambda: progress and progress[-1].evaluated > 20)
+    wait_for(lambda: progress and progress[-1].evaluated > 20, START_TIMEOUT)
     assert progress[-1].total == 10**9
     assert progress[-1].rate > 0.0
     assert np.isfinite(progress[-1].best).all()
@@ -85,7 +85,7 @@ def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_pa
     assert partial.robot
     heard = []
     again = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=heard.append)
-    wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated)
+    wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated, START_TIMEOUT)
     again.cancel()
     with pytest.raises(errors.CancelledError):
         again.wait()

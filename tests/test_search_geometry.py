@@ -4,11 +4,12 @@ import os
 import resource
 import signal
 import subprocess
-import time
+import sys
 from pathlib import Path
 
 import pytest
 from node_processes import find_executable
+from nodes_support import START_TIMEOUT
 
 from leg_kinematics import load_robot
 
@@ -34,10 +35,14 @@ def study(tmp_path):
     return path
 
 
-def begin(study, folder, *options, **keywords):
-    command = [find_executable("leg_statics", "search_geometry"), study, "--output", folder]
+COMMAND = (find_executable("leg_statics", "search_geometry"),)
+HELD = (sys.executable, Path(__file__).with_name("search_held.py"))
+
+
+def begin(study, folder, *options, command=COMMAND, **keywords):
     return subprocess.Popen(
-        [*map(str, command), *options],
+        [*map(str, command), study, "--output", folder, *options],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -46,7 +51,7 @@ def begin(study, folder, *options, **keywords):
 
 
 def finish(process):
-    output, errors = process.communicate(timeout=120.0)
+    output, errors = process.communicate(timeout=START_TIMEOUT)
     return process.returncode, output, errors
 
 
@@ -55,10 +60,16 @@ def designs(folder):
     return path.read_bytes() if path.exists() else b""
 
 
-def wait_for_designs(process, folder, count):
-    while designs(folder).count(b"\n") <= count:
-        assert process.poll() is None, finish(process)
-        time.sleep(0.001)
+def begin_held(count, study, folder, *options, **keywords):
+    """Begin a search, and return it when it is held after so many designs."""
+    process = begin(study, folder, *options, command=(*HELD, count), **keywords)
+    for line in process.stdout:
+        if line == "held\n":
+            break
+    else:
+        raise AssertionError(finish(process))
+    assert designs(folder).count(b"\n") > count  # and a line of names
+    return process
 
 
 @pytest.fixture(scope="module")
@@ -86,15 +97,13 @@ def test_a_search_that_is_killed_and_interrupted_goes_on_with_nothing_lost(study
     folder = tmp_path / "out"
     kept = b""
     for count in (1, 60):
-        process = begin(study, folder, "--workers", "2")
-        wait_for_designs(process, folder, count)
+        process = begin_held(count, study, folder, "--workers", "2")
         process.kill()
         assert finish(process)[0] == -signal.SIGKILL
         assert designs(folder).startswith(kept)
         kept = designs(folder)[: designs(folder).rfind(b"\n") + 1]
 
-    process = begin(study, folder, start_new_session=True)
-    wait_for_designs(process, folder, 120)
+    process = begin_held(120, study, folder, start_new_session=True)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to the workers too
     code, _, errors = finish(process)
     assert code == 130
@@ -126,8 +135,7 @@ def test_a_full_disk_is_told_and_what_was_found_is_kept(study, whole, tmp_path):
 
 def test_a_worker_that_is_killed_costs_no_result(study, whole, tmp_path):
     folder = tmp_path / "out"
-    process = begin(study, folder, "--workers", "2")
-    wait_for_designs(process, folder, 20)
+    process = begin_held(20, study, folder, "--workers", "2")
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     worker = next(k for k in children if b"spawn_main" in Path(f"/proc/{k}/cmdline").read_bytes())
     os.kill(int(worker), signal.SIGKILL)

@@ -24,6 +24,7 @@ from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.definitions import message_class, message_definition
 from leg_msgs_py.recordings.errors import ReplayError
 from leg_msgs_py.recordings.recorder import spin
+from leg_msgs_py.recordings.replay_flow import PATIENCE
 from leg_msgs_py.recordings.replay_session import Session
 from rclpy.context import Context
 from rclpy.node import Node
@@ -105,11 +106,12 @@ class Replay:
         rate: float = 1.0,
         clock: bool = False,
         timeout: float = START_TIMEOUT,
+        patience: float = PATIENCE,
     ) -> dict[str, list[Any]]:
         """Play a recording and return what the nodes made of it.
 
         It begins when all who subscribe to the topics, and all who publish what is collected, are
-        connected. It ends when the last input is answered, or has found no answer for a second.
+        connected. It ends when the last input is answered, or has found no answer for `patience`.
         An output answers the input that has the same stamp, and tells that the nodes are done
         with all that was sent before it.
 
@@ -122,6 +124,8 @@ class Replay:
             clock: Whether to publish the time of the recording as /clock, for nodes with the
                 parameter `use_sim_time`.
             timeout: How long to wait for the nodes [s].
+            patience: How long to wait for an answer; inputs that find none later than that, such
+                as those refused, get none [s].
 
         Returns:
             Messages by topic, in the order they came.
@@ -136,7 +140,7 @@ class Replay:
             raise ReplayError(f"rate must be > 0, got {rate}")
         recording = Bag(bag)
         _check_topics(recording, topics)
-        session = Session(self._node, self._prefix, time.monotonic() + timeout)
+        session = Session(self._node, self._prefix, time.monotonic() + timeout, patience)
         try:
             for name in collect:
                 session.open_output(name)

@@ -11,8 +11,7 @@ from typing import TypeAlias
 # How far the player is ahead of the answers, on each topic, when it plays as fast as possible: less
 # than the five messages that a subscriber with the profile of sensor data keeps.
 WINDOW = 4
-# Inputs without an answer this long after the last one get none, such as those refused [s].
-PATIENCE = 1.0
+PATIENCE = 1.0  # answers come sooner, on a machine that is not too busy [s]
 
 Stamp: TypeAlias = bytes  # as it is serialised
 
@@ -38,9 +37,14 @@ class Pace:
 
 
 class Flow:
-    """The inputs that wait for their answers."""
+    """The inputs that wait for their answers.
 
-    def __init__(self) -> None:
+    Args:
+        patience: How long they wait [s].
+    """
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
         self._changed = threading.Condition()
         self._waiting: deque[tuple[str, Stamp]] = deque()  # topic and stamp, in the order sent
         self._topics: Counter[str] = Counter()  # how many of each wait
@@ -73,10 +77,10 @@ class Flow:
         self._wait(lambda: not self._waiting)
 
     def _wait(self, is_over: Callable[[], bool]) -> None:
-        """Wait for answers; what has none within `PATIENCE` gets none."""
+        """Wait for answers; what has none in the time allowed gets none."""
         with self._changed:
             while not is_over():
-                if not self._changed.wait(PATIENCE):
+                if not self._changed.wait(self._patience):
                     for each in (self._waiting, self._topics, self._stamps):
                         each.clear()
 

@@ -54,19 +54,20 @@ class Session:
         node: Node to play with; it spins in another thread.
         prefix: What the names of topics have before the recorded ones.
         deadline: When all must be connected (monotonic) [s].
+        patience: How long to wait for an answer [s].
 
     Attributes:
         outputs: What is collected, by topic.
     """
 
-    def __init__(self, node: Node, prefix: str, deadline: float) -> None:
+    def __init__(self, node: Node, prefix: str, deadline: float, patience: float) -> None:
         self.outputs: dict[str, Output] = {}
         self._inputs: dict[str, Publisher] = {}
         self._clock: Publisher | None = None
         self._node = node
         self._prefix = prefix
         self._deadline = deadline
-        self._flow = Flow()
+        self._flow = Flow(patience)
 
     def open_output(self, topic: str) -> None:
         """Subscribe to a topic once it is published."""
@@ -124,6 +125,7 @@ class Session:
         pace = Pace(rate)
         before: int | None = None
         for message in messages:
+            self._check_nodes()
             if self._clock is not None:
                 start = message.time if before is None else before
                 ticks = range(start + CLOCK_PERIOD, message.time, CLOCK_PERIOD)
@@ -137,6 +139,9 @@ class Session:
             self._flow.send(message.topic, stamp_of(message.data))
             self._inputs[message.topic].publish(message.data)
         self._flow.wait_for_all()
+        self._check_nodes()
+
+    def _check_nodes(self) -> None:
         for topic, output in self.outputs.items():
             if not output.subscription.get_publisher_count():
                 raise ReplayError(f"{topic}: its node ended after {len(output.data)} messages")
