@@ -11,7 +11,7 @@ sys.path.insert(0, str(HERE))
 
 import pytest  # noqa: E402
 from node_processes import NodeProcesses  # noqa: E402
-from nodes_support import MAX_POINTS, PATIENCE, START_TIMEOUT  # noqa: E402
+from nodes_support import MAX_POINTS, PATIENCE, wait_until_ready  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -29,5 +29,5 @@ def suite():
 
     parameters = {"max_points": MAX_POINTS, "diagnostics_rate": 10.0}
     with NodeProcesses(parameters=parameters) as nodes, LegClient(timeout=PATIENCE) as client:
-        client.wait_until_ready(START_TIMEOUT)
+        wait_until_ready(client, nodes)
         yield SimpleNamespace(nodes=nodes, client=client)

@@ -1,15 +1,17 @@
 """What the tests of the nodes share."""
 
 import time
+from contextlib import suppress
 
 from leg_msgs_py.client import SERVICES, LegClient
 from leg_msgs_py.client.questions import Request
+from leg_msgs_py.errors import ServerUnavailableError
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
 # How long tests wait for what must come: longer than it takes on any machine, however busy.
 PATIENCE = 60.0  # [s]
-START_TIMEOUT = 600.0  # for nodes and programs: the first start on a machine compiles [s]
+START_TIMEOUT = 1800.0  # for nodes and programs: the first start on a machine compiles [s]
 MAX_POINTS = 1000
 
 
@@ -20,6 +22,18 @@ def wait_for(condition, timeout=PATIENCE):
         assert time.monotonic() < deadline, f"nothing within {timeout} s"
         time.sleep(0.01)
     return value
+
+
+def wait_until_ready(client, nodes):
+    """Wait until all services are there, as long as no node ends."""
+
+    def are_ready():
+        assert nodes.ended() == {}
+        with suppress(ServerUnavailableError):
+            client.wait_until_ready(0.5)
+            return True
+
+    wait_for(are_ready, START_TIMEOUT)
 
 
 def ask(client, service, request):

@@ -15,7 +15,7 @@ import pytest
 from geometry_msgs.msg import PoseArray
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses
-from nodes_support import PATIENCE, START_TIMEOUT, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, wait_for, wait_until_ready
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_domain import claim_domain
 from std_msgs.msg import Float64
@@ -52,8 +52,11 @@ def run(name, *arguments, timeout=START_TIMEOUT, **environment):
 @pytest.fixture(scope="module")
 def nodes():
     # Not the session's `suite`: 10,000 candidates are more points than that one accepts.
-    with NodeProcesses("hexapod", namespace="examples"), LegClient(namespace="examples") as client:
-        client.wait_until_ready(START_TIMEOUT)
+    with (
+        NodeProcesses("hexapod", namespace="examples") as nodes,
+        LegClient(namespace="examples", timeout=PATIENCE) as client,
+    ):
+        wait_until_ready(client, nodes)
         yield client
 
 

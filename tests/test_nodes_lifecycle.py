@@ -14,7 +14,7 @@ import rclpy
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses, node_names
-from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for, wait_until_ready
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from ruamel.yaml import YAML
@@ -323,7 +323,7 @@ def test_a_client_lives_through_a_restart_of_the_nodes():
     outputs = []
     nodes = NodeProcesses(namespace="robot_1", stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     with nodes, LegClient(namespace="robot_1", timeout=START_TIMEOUT) as client:
-        client.wait_until_ready(START_TIMEOUT)
+        wait_until_ready(client, nodes)
         wanted = client.inverse_kinematics("left_front", FOOT).joint_positions
         nodes.processes["kinematics"].send_signal(signal.SIGINT)
         nodes.processes["maps"].send_signal(signal.SIGINT)
@@ -345,7 +345,7 @@ def test_a_manipulator_with_four_coordinates_is_served():
         NodeProcesses("gantry", namespace="gantry") as nodes,
         LegClient(namespace="gantry", timeout=PATIENCE) as client,
     ):
-        client.wait_until_ready(START_TIMEOUT)
+        wait_until_ready(client, nodes)
         arm = client.describe("")
         assert arm.task_coordinates == ("x", "y", "z", "beta")
         joints = [[0.0, 0.0, 0.0, 0.0], [0.001, 0.002, -0.001, 0.0005]]

@@ -8,7 +8,7 @@ from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.grounds import Ground
 from node_processes import NodeProcesses
-from nodes_support import PATIENCE, START_TIMEOUT
+from nodes_support import PATIENCE, wait_until_ready
 from ruamel.yaml import YAML
 
 from leg_kinematics import Status, load_robot
@@ -71,10 +71,10 @@ def zoo(tmp_path_factory):
         YAML(typ="safe").dump(mixed_description(), file)
     robot = load_robot(path)
     with (
-        NodeProcesses(str(path), namespace="zoo"),
+        NodeProcesses(str(path), namespace="zoo") as nodes,
         LegClient(namespace="zoo", timeout=PATIENCE) as client,
     ):
-        client.wait_until_ready(START_TIMEOUT)
+        wait_until_ready(client, nodes)
         yield SimpleNamespace(robot=robot, client=client)
 
 
