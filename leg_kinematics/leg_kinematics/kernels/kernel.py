@@ -173,11 +173,13 @@ def _meanings(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     if function in seen:
         return
     seen.add(function)
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    known = {**function.__globals__, **dict(zip(function.__code__.co_freevars, cells, strict=True))}
     for code in _codes(function.__code__):
         constants = [c for c in code.co_consts if not isinstance(c, CodeType)]
         yield repr((code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants))
-        for name in code.co_names:
-            value = function.__globals__.get(name)
+        for name in code.co_names + code.co_freevars:
+            value = known.get(name)
             if isinstance(value, FunctionType):
                 yield from _meanings(value, seen)
             elif isinstance(value, (int, float)) and value == value:  # no NaN

@@ -5,15 +5,15 @@ as papers draw them (Y up, the foot below), the crank turning counter-clockwise.
 its origin at A too, with x = -X and z = Y, because a foot on the ground then moves towards -x when
 the crank turns forwards: the leg walks along +x. The crank's axis is +y of the leg frame.
 
-A mechanism adds its geometry and a handful of kernels, which all get its geometry and its `sides`:
-numbers whose signs tell the assembly (see `dyads`). A posture's closure is such numbers, the
-`across` coefficient of each dyad. The kernels that give positions run over blocks of crank angles.
+A mechanism adds its geometry, its `sides`, numbers whose signs tell the assembly (see `dyads`), and
+the points that follow from them, of which `crank_kernels` makes its kernels. A posture's closure is
+such numbers, the `across` coefficient of each dyad.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -24,22 +24,17 @@ from numpy.typing import ArrayLike
 from leg_kinematics.arrays import FloatArray, as_array, as_matching, wrapped_angles
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned
-from leg_kinematics.kernels.blocks import load, put, store
-from leg_kinematics.kernels.kernel import Kernel, inlined, kernel, scalar
-from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE, within
+from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE
 from leg_kinematics.mechanism import Joint, Linkage, Posture
-from leg_kinematics.mechanisms.dyads import Point, crank_pin, fixed
+from leg_kinematics.mechanisms.crank_kernels import Kernels, near_brackets
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
 
 TURN = 2.0 * math.pi
 ANY_ANGLE = (-math.pi, math.pi)  # a range of a whole turn or more is no limit
-DEAD_POINT = 1e-6  # |sin| of the angle between a dyad's bars, below which the foot is not governed
 CURVE_SAMPLES = 720  # of the foot curve, between which passes of the foot are refined
-MAX_PASSES = 8  # of the foot at a point
 REFINEMENTS = 60
-REFINED = 1e-14  # [rad]
 
 
 class Dyad(NamedTuple):
@@ -66,18 +61,6 @@ class Pivot(NamedTuple):
     second: str
 
 
-class Kernels(NamedTuple):
-    """The compiled mathematics of one linkage; see any of the mechanisms for the signatures."""
-
-    constants: Kernel
-    forward: Callable[..., Any]
-    motion: Kernel
-    points: Callable[..., Any]
-    foot_in_plane: Kernel
-    nearest: Kernel
-    crossing: Kernel
-
-
 class Passes(NamedTuple):
     """Crank angles at which the foot passes a point, nearest first; NaN beyond the last.
 
@@ -88,200 +71,6 @@ class Passes(NamedTuple):
 
     crank_angles: FloatArray
     distances: FloatArray
-
-
-# --------------------------------------------------------------------------- scalar mathematics
-
-
-@inlined
-def side(number: float) -> float:
-    """Return the sign of a number as +1 or -1; NaN for NaN."""
-    return math.nan if math.isnan(number) else math.copysign(1.0, number)
-
-
-@inlined
-def in_leg_frame(crank: float, x: float, y: float) -> tuple[float, float, float]:
-    """Return a vector of the linkage's plane, in crank lengths, in the leg frame."""
-    return -crank * x, 0.0, crank * y
-
-
-@inlined
-def turning_pin(angle: float) -> Point:
-    """Return the crank's pin B and its derivatives by the crank angle."""
-    return crank_pin(fixed(0.0, 0.0), 1.0, angle, 1.0, 0.0)
-
-
-@inlined
-def status_of_crank(q: float, limits: tuple[float, float], foot: Point, transmission: float) -> int:
-    """Return the status of one crank angle, given the worst transmission of its dyads."""
-    unlimited = limits[1] - limits[0] >= TURN - LIMIT_TOLERANCE
-    status = OK if unlimited | within(q, limits) else JOINT_LIMIT
-    status = SINGULAR if transmission < DEAD_POINT else status
-    status = status if math.isfinite(foot.x + foot.y + transmission) else UNREACHABLE
-    return status if math.isfinite(q) else INVALID_INPUT
-
-
-# Kernels that give positions run over blocks of crank angles with these rows; more may follow.
-Q, PIN, STATUS, FOOT, CLOSURE = 0, 1, 3, 4, 7
-
-
-@inlined
-def load_cranks(block: FloatArray, q: FloatArray, zero: float, start: int, end: int) -> None:
-    """Fill the rows of crank angles and pins of a block.
-
-    The loop that assembles the linkages takes the pins from there, because the library's cosine
-    and sine compute one angle at a time.
-    """
-    load(block, Q, q, start, end, 1)
-    for i in range(end - start):
-        pin = turning_pin(zero + block[Q, i])
-        block[PIN, i], block[PIN + 1, i] = pin.x, pin.y
-
-
-@inlined
-def resting_pin(block: FloatArray, i: int) -> Point:
-    """Return the crank's pin B where only positions are asked for."""
-    return fixed(block[PIN, i], block[PIN + 1, i])
-
-
-@inlined
-def put_forward(
-    block: FloatArray,
-    i: int,
-    crank: float,
-    limits: tuple[float, float],
-    foot: Point,
-    closure: tuple[float, ...],
-    transmission: float,
-) -> None:
-    """Write status, foot in the leg frame and closure; NaN where there is no answer."""
-    status = status_of_crank(block[Q, i], limits, foot, transmission)
-    known = math.nan if (status == UNREACHABLE) | (status == INVALID_INPUT) else 1.0
-    block[STATUS, i] = status
-    x, y, z = in_leg_frame(crank, foot.x, foot.y)
-    put(block, FOOT, i, (x * known, y * known, z * known))
-    for k in range(len(closure)):
-        block[CLOSURE + k, i] = closure[k] * known
-
-
-@inlined
-def store_forward(
-    block: FloatArray,
-    foot: FloatArray,
-    closure: FloatArray,
-    status: FloatArray,
-    start: int,
-    end: int,
-    closures: int,
-) -> None:
-    """Copy what `put_forward` wrote to points start to end of arrays."""
-    store(block, FOOT, foot, start, end, 3)
-    store(block, CLOSURE, closure, start, end, closures)
-    for i in range(end - start):
-        status[start + i] = int(block[STATUS, i])
-
-
-@inlined
-def put_points(
-    block: FloatArray, row: int, i: int, crank: float, points: tuple[Point, ...]
-) -> None:
-    """Write points in the leg frame below each other, from `row` on."""
-    for k in range(len(points)):
-        put(block, row + 3 * k, i, in_leg_frame(crank, points[k].x, points[k].y))
-
-
-@inlined
-def store_points(
-    block: FloatArray, row: int, points: FloatArray, start: int, end: int, count: int
-) -> None:
-    """Copy what `put_points` wrote to an array (m, count, 3)."""
-    for i in range(end - start):
-        for k in range(count):
-            for axis in range(3):
-                points[start + i, k, axis] = block[row + 3 * k + axis, i]
-
-
-class Bracket(NamedTuple):
-    """A root between two crank angles, the best guess of it, and the state of its search."""
-
-    lower: float
-    upper: float
-    angle: float
-    steps: int
-    done: bool
-
-
-@scalar
-def bracket_between(lower: float, upper: float) -> Bracket:
-    """Return a bracket; a search in a NaN bracket is over."""
-    return Bracket(lower, upper, 0.5 * (lower + upper), 0, not lower <= upper)
-
-
-@scalar
-def narrowed(bracket: Bracket, value: float, slope: float) -> Bracket:
-    """Return the bracket after a step towards the root of a rising function.
-
-    A step of Newton's method if it stays inside, else a bisection. NaN, where the linkage does not
-    close, lies beyond the root.
-    """
-    lower, upper, angle, steps, _ = bracket
-    if value > 0.0 or (math.isnan(value) and angle > 0.5 * (lower + upper)):
-        upper = angle
-    else:
-        lower = angle
-    following = angle - value / slope
-    if not (slope > 0.0 and lower <= following <= upper):
-        following = 0.5 * (lower + upper)
-    done = abs(following - angle) < REFINED or steps >= REFINEMENTS
-    return Bracket(lower, upper, following, steps + 1, done)
-
-
-@scalar
-def approach(foot: Point, x: float, y: float) -> tuple[float, float]:
-    """Return first and second derivative of half the foot's squared distance from (x, y)."""
-    dx, dy = foot.x - x, foot.y - y
-    slope = dx * foot.vx + dy * foot.vy
-    return slope, foot.vx * foot.vx + foot.vy * foot.vy + dx * foot.ax + dy * foot.ay
-
-
-@scalar
-def squared_distance(curve: FloatArray, i: int, x: float, y: float) -> float:
-    """Return the squared distance of sample i from (x, y); infinite for a separator."""
-    squared = (curve[i, 1] - x) ** 2 + (curve[i, 2] - y) ** 2
-    return math.inf if math.isnan(squared) else squared
-
-
-@kernel("(m,t),(),(),(k)->(k),(k)", "f8[:,:], f8, f8, f8[:], f8[:], f8[:]")
-def _near_brackets(curve, x, y, shape, lower, upper):  # type: ignore[no-untyped-def]
-    """Brackets about the samples nearer to (X, Y) than both neighbours, nearest first, then NaN.
-
-    The first and the last sample only serve as neighbours.
-    """
-    lower[:] = math.nan
-    upper[:] = math.nan
-    if not math.isfinite(x + y):
-        return
-    samples = curve.shape[0]
-    nearest = np.zeros(lower.shape[0], dtype=np.int64)
-    squares = np.full(lower.shape[0], math.inf)
-    before, here = squared_distance(curve, 0, x, y), squared_distance(curve, 1, x, y)
-    for i in range(1, samples - 1):
-        after = squared_distance(curve, i + 1, x, y)
-        if here <= before and here <= after and here < squares[-1]:
-            k = squares.shape[0] - 1
-            while k > 0 and squares[k - 1] > here:
-                nearest[k], squares[k] = nearest[k - 1], squares[k - 1]
-                k -= 1
-            nearest[k], squares[k] = i, here
-        before, here = here, after
-    for k in range(squares.shape[0]):
-        if squares[k] < math.inf:
-            i = nearest[k]
-            lower[k] = curve[i - 1, 0] if math.isfinite(curve[i - 1, 0]) else curve[i, 0]
-            upper[k] = curve[i + 1, 0] if math.isfinite(curve[i + 1, 0]) else curve[i, 0]
-
-
-# --------------------------------------------------------------------------- mechanism
 
 
 def mode_sides(walking: Sequence[float]) -> FloatArray:
@@ -310,7 +99,6 @@ class CrankLinkage(Dimensioned):
 
     sides: ClassVar[FloatArray]  # of every assembly mode
     kernels: ClassVar[Kernels]
-    constants_size: ClassVar[int]
     point_names: ClassVar[tuple[str, ...]]
     dyads: ClassVar[tuple[Dyad, ...]]
     triangles: ClassVar[tuple[Triangle, ...]]
@@ -365,9 +153,7 @@ class CrankLinkage(Dimensioned):
 
     @cached_property
     def _constants(self) -> FloatArray:
-        constants: FloatArray = self.kernels.constants(
-            self._geometry, np.zeros(self.constants_size)
-        )
+        constants: FloatArray = self.kernels.constants(self._geometry)
         return constants
 
     def _sides(self, assembly_mode: str) -> FloatArray:
@@ -436,8 +222,8 @@ class CrankLinkage(Dimensioned):
         foot = as_array("foot_position", foot_position, 3)
         mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):  # infinitely far is far enough
-            x, y = -foot[..., 0] / self.crank_length, foot[..., 2] / self.crank_length
-        lower, upper = _near_brackets(self._curves[mode], x, y, np.zeros(MAX_PASSES))
+            x, y = -foot[..., 1] / self.crank_length, foot[..., 2] / self.crank_length
+        lower, upper = near_brackets(self._curves[mode], x, y)
         angles, distances = self.kernels.nearest(
             self._constants, self.sides[mode], x[..., None], y[..., None], lower, upper
         )
@@ -476,9 +262,7 @@ class CrankLinkage(Dimensioned):
 
     def _foot_in_plane(self, mode: int, angles: FloatArray) -> FloatArray:
         """Return the foot's X, Y and dX in the linkage's plane, in cranks (..., 3)."""
-        foot: FloatArray = self.kernels.foot_in_plane(
-            self._constants, self.sides[mode], angles, np.zeros(3)
-        )
+        foot: FloatArray = self.kernels.foot_in_plane(self._constants, self.sides[mode], angles)
         return foot
 
     def _closing_ranges(self, mode: int) -> list[tuple[float, float]]:
@@ -561,9 +345,7 @@ class CrankLinkage(Dimensioned):
         return shifted
 
     def _motion(self, posture: Posture) -> Any:
-        return self.kernels.motion(
-            self._constants, posture.closure, posture.joint_positions, np.zeros(3)
-        )
+        return self.kernels.motion(self._constants, posture.closure, posture.joint_positions)
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of the foot's velocity, v = J q' (..., 3, 1) [m/rad]."""

@@ -16,37 +16,19 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
-
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.assembly_modes import flipped_modes
 from leg_kinematics.geometry import parameter
-from leg_kinematics.kernels.blocks import BLOCK, get3, load
-from leg_kinematics.kernels.kernel import inlined, kernel, scalar
-from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.mechanism import Joint
+from leg_kinematics.mechanisms.crank_kernels import Kernels, linkage_kernels, side
 from leg_kinematics.mechanisms.crank_linkage import (
     ANY_ANGLE,
-    CLOSURE,
     CrankLinkage,
     Dyad,
-    Kernels,
     Pivot,
     Triangle,
-    approach,
-    bracket_between,
-    in_leg_frame,
-    load_cranks,
     mode_sides,
-    narrowed,
-    put_forward,
-    put_points,
-    resting_pin,
-    side,
-    store_forward,
-    store_points,
-    turning_pin,
 )
 from leg_kinematics.mechanisms.dyads import (
     Point,
@@ -56,7 +38,6 @@ from leg_kinematics.mechanisms.dyads import (
     rigid_point,
     transmission,
     triangle_coefficients,
-    turning_rate,
 )
 
 
@@ -107,9 +88,6 @@ class Points(NamedTuple):
     g: Point
 
 
-GEOMETRY_SIZE, CONSTANTS_SIZE = len(Geometry._fields), len(Constants._fields)
-POINTS_SIZE = len(Points._fields)
-
 # Which way round the parts are assembled; the signs below are those of the walking leg.
 PARTS = ("rocker", "rod", "crank", "foot")
 WALKING = (
@@ -118,7 +96,6 @@ WALKING = (
     -1.0,  # E to the right of A to B
     -1.0,  # G to the right of C to F
 )
-SIDES_SIZE = len(PARTS)
 Sides = tuple[float, float, float, float]
 
 
@@ -154,99 +131,9 @@ def worst_transmission(k: Constants, p: Points, across: Sides) -> float:
     )
 
 
-@inlined
-def foot_motion(k: Constants, sides: Sides, angle: float) -> Point:
-    """Return the foot G and its derivatives by the crank angle."""
-    return linkage_points(k, sides, turning_pin(angle))[0].g
-
-
-# --------------------------------------------------------------------------- kernels
-
-# Rows of a block that follow those of `crank_linkage`:
-POINTS = CLOSURE + SIDES_SIZE
-ROWS = POINTS + 3 * POINTS_SIZE
-
-
-@kernel("(g),(c)->(c)", "f8[:], f8[:], f8[:]")
-def constants_of_geometry(geometry, shape, constants):  # type: ignore[no-untyped-def]
-    """Geometry to the constants that the other kernels take; `shape` only sets a length."""
-    k = constants_of(Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE)))
-    for i in range(CONSTANTS_SIZE):
-        constants[i] = k[i]
-
-
-@points_kernel("(c),(s),(2),(points,1)->(points,3),(points,s),(points)", "f8 f8 f8 f8 f8 f8 u1")
-def _forward(constants, sides, limits, q, foot, closure, status):  # type: ignore[no-untyped-def]
-    """Crank angles to foot in the leg frame, closure and status."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    mode, bounds = to_fixed_tuple(sides, SIDES_SIZE), to_fixed_tuple(limits, 2)
-    block = np.empty((ROWS, BLOCK))
-    for start in range(0, len(q), BLOCK):
-        end = min(start + BLOCK, len(q))
-        load_cranks(block, q, k.zero, start, end)
-        for i in range(end - start):
-            p, assembly = linkage_points(k, mode, resting_pin(block, i))
-            worst = worst_transmission(k, p, assembly)
-            put_forward(block, i, k.crank, bounds, p.g, assembly, worst)
-        store_forward(block, foot, closure, status, start, end, SIDES_SIZE)
-
-
-@kernel("(c),(s),(n),(d)->(d),(d),(d)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
-def _motion(constants, sides, q, shape, velocity, acceleration, turning):  # type: ignore[no-untyped-def]
-    """First and second derivative of the foot and the foot link's turning by the crank angle."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    p = linkage_points(k, sides, turning_pin(k.zero + q[0]))[0]
-    velocity[0], velocity[1], velocity[2] = in_leg_frame(k.crank, p.g.vx, p.g.vy)
-    acceleration[0], acceleration[1], acceleration[2] = in_leg_frame(k.crank, p.g.ax, p.g.ay)
-    turning[0], turning[1], turning[2] = 0.0, turning_rate(p.c, p.f), 0.0
-
-
-@points_kernel(f"(c),(points,s),(points,1)->(points,{POINTS_SIZE},3)", "f8 f8 f8 f8")
-def _points(constants, sides, q, points):  # type: ignore[no-untyped-def]
-    """All points in the leg frame."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    block = np.empty((ROWS, BLOCK))
-    for start in range(0, len(q), BLOCK):
-        end = min(start + BLOCK, len(q))
-        load_cranks(block, q, k.zero, start, end)
-        load(block, CLOSURE, sides, start, end, SIDES_SIZE)
-        for i in range(end - start):
-            mode = (*get3(block, CLOSURE, i), block[CLOSURE + 3, i])
-            p = linkage_points(k, mode, resting_pin(block, i))[0]
-            put_points(block, POINTS, i, k.crank, p)
-        store_points(block, POINTS, points, start, end, POINTS_SIZE)
-
-
-@kernel("(c),(s),(),(t)->(t)", "f8[:], f8[:], f8, f8[:], f8[:]")
-def foot_in_plane(constants, sides, angle, shape, result):  # type: ignore[no-untyped-def]
-    """Foot X, Y and dX/dalpha in the linkage's plane and crank lengths."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    p = foot_motion(k, sides, angle)
-    result[0], result[1], result[2] = p.x, p.y, p.vx
-
-
-@kernel("(c),(s),(),(),(),()->(),()", "f8[:], f8[:], f8, f8, f8, f8, f8[:], f8[:]")
-def _nearest(constants, sides, x, y, lower, upper, angle, distance):  # type: ignore[no-untyped-def]
-    """Crank angle in a bracket at which the foot is nearest to (X, Y), and how near."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    bracket = bracket_between(lower, upper)
-    while not bracket.done:
-        p = foot_motion(k, sides, bracket.angle)
-        slope, curvature = approach(p, x, y)
-        bracket = narrowed(bracket, slope, curvature)
-    p = foot_motion(k, sides, bracket.angle)
-    angle[0], distance[0] = bracket.angle, math.hypot(p.x - x, p.y - y)
-
-
-@kernel("(c),(s),(),(),(),()->()", "f8[:], f8[:], f8, f8, f8, f8, f8[:]")
-def _crossing(constants, sides, x, lower, upper, sense, angle):  # type: ignore[no-untyped-def]
-    """Crank angle in a bracket where the foot's X is x; sense is +1 if X rises there, else -1."""
-    k = Constants(*to_fixed_tuple(constants, CONSTANTS_SIZE))
-    bracket = bracket_between(lower, upper)
-    while not bracket.done:
-        p = foot_motion(k, sides, bracket.angle)
-        bracket = narrowed(bracket, sense * (p.x - x), sense * p.vx)
-    angle[0] = bracket.angle
+kernels = linkage_kernels(
+    Geometry, Constants, Points, len(PARTS), constants_of, linkage_points, worst_transmission
+)
 
 
 # --------------------------------------------------------------------------- mechanism
@@ -271,10 +158,7 @@ class SixBar(CrankLinkage):
     assembly_modes: ClassVar[tuple[str, ...]] = flipped_modes("walking", PARTS)
 
     sides: ClassVar[FloatArray] = mode_sides(WALKING)
-    kernels: ClassVar[Kernels] = Kernels(
-        constants_of_geometry, _forward, _motion, _points, foot_in_plane, _nearest, _crossing
-    )
-    constants_size: ClassVar[int] = CONSTANTS_SIZE
+    kernels: ClassVar[Kernels] = kernels
     point_names: ClassVar[tuple[str, ...]] = ("A", "B", "C", "D", "E", "F", "G")
     dyads: ClassVar[tuple[Dyad, ...]] = (
         Dyad("C", ("B", "D"), ("coupler", "rocker")),

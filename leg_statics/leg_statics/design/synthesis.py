@@ -21,13 +21,7 @@ from scipy.optimize import brentq, differential_evolution, least_squares
 
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import GeometryError, ValueRangeError
-from leg_kinematics.mechanisms.six_bar import (
-    PARTS,
-    WALKING,
-    SixBar,
-    constants_of_geometry,
-    foot_in_plane,
-)
+from leg_kinematics.mechanisms.six_bar import PARTS, WALKING, SixBar
 from leg_kinematics.mechanisms.theo_jansen import TheoJansen
 
 SAMPLES = 200  # N of equation (8)
@@ -275,9 +269,9 @@ def _feet(designs: Design, crank_angles: FloatArray) -> ComplexArray:
         ),
         axis=-1,
     )
-    constants = constants_of_geometry(geometry, np.zeros(SixBar.constants_size))
-    foot = foot_in_plane(
-        constants[..., None, :], designs.sides[..., None, :], crank_angles, np.zeros(3)
+    constants = SixBar.kernels.constants(geometry)
+    foot = SixBar.kernels.foot_in_plane(
+        constants[..., None, :], designs.sides[..., None, :], crank_angles
     )
     return foot[..., 0] + 1j * foot[..., 1]
 
