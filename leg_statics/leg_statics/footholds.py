@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,8 +34,10 @@ from leg_statics.capacity.problem import (
     OF_CONTACT,
     OF_POINT,
     OMEGA,
+    OUTCOME,
     RESERVE,
     ROUGH,
+    UNCERTAIN,
     UPPER,
     WANTED,
     J,
@@ -43,7 +46,9 @@ from leg_statics.capacity.problem import (
     leave_room,
     new_block,
     row_of,
-    solve,
+    settled,
+    solve_any,
+    solve_three,
 )
 from leg_statics.contact import Contact as Contact
 from leg_statics.contact import check_contact, contact_rows, leading_shapes
@@ -218,7 +223,7 @@ def _judged(leg: Leg, posture: Posture, twist_jacobian: FloatArray, contact: Con
     limits = as_array("effort_limits", leg.effort_limits, n, 2)
     given = contact_rows(contact, n)
     try:
-        verdict, numbers = _footholds(limits, twist_jacobian, posture.status, given)
+        verdict, numbers = _verdicts(limits, twist_jacobian, posture.status, given)
     except ValueError:
         shapes = {"candidates": np.shape(posture.status), **leading_shapes(contact, n)}
         raise broadcast_error(shapes) from None
@@ -226,6 +231,20 @@ def _judged(leg: Leg, posture: Posture, twist_jacobian: FloatArray, contact: Con
         check_effort_limits(limits[:, 0], limits[:, 1])
         check_contact(contact, n)
     return Footholds(verdict, posture, numbers)
+
+
+def _verdicts(
+    limits: FloatArray, twist: FloatArray, status: StatusArray, contacts: FloatArray
+) -> Any:
+    """Return verdicts and numbers, quickly where that tells."""
+    if len(limits) != 3:
+        return _thorough_footholds(limits, twist, status, contacts)
+    results = _quick_footholds(limits, twist, status, contacts)
+    if not has_code(results[0], UNCERTAIN):
+        return results
+    thorough = partial(_thorough_footholds, limits)
+    inputs = (twist, 2), (status, 0), (contacts, 1)
+    return settled(results, results[0] == UNCERTAIN, thorough, *inputs)
 
 
 # --------------------------------------------------------------------------- kernel
@@ -296,6 +315,7 @@ def judge(block, i, n):
     capacity, load, status = block[CAPACITY, i], block[LOAD, i], block[STATUS, i]
     solved, held = status == OK, block[WANTED, i] == 1.0
     verdict = foothold_verdict(status, held, capacity, block[ROUGH, i], load)
+    verdict = UNCERTAIN if held & (block[OUTCOME, i] == UNCERTAIN) else verdict
     block[VERDICT, i] = verdict if block[VALID, i] == 1.0 else WRONG_CONTACT
     capacity = capacity if held else (0.0 if solved else math.nan)
     block[CAPACITY, i] = capacity
@@ -324,45 +344,47 @@ def judge(block, i, n):
     block[MARGIN, i] = block[MU, i] - block[MU_E, i]
 
 
-@points_kernel("(n,2),(points,6,n),(points),(points,w)->(points),(points,w)", "f8 f8 u1 f8 u1 f8")
-def _footholds(limits, twist, status, contact, verdict, numbers):
-    """Judge points in blocks; with three actuators the number is a constant for the compiler.
+def _footholds_kernel(solve, joints):
+    """Return a kernel that judges points of legs with so many joints, a constant, or any if 0.
 
     What a contact says and what is found of it stand in one row each, because every array costs a
     call as much as some points do. Both rows are 9 + n long.
     """
-    n = len(limits)
-    block = new_block(n, len(status))
-    for i in range(min(BLOCK, len(status))):
-        block[MU_E, i] = block[MU_FULL, i] = math.nan
-        for k in range(n):
-            block[row_of(LOWER, n, k), i] = limits[k, 0]
-            block[row_of(UPPER, n, k), i] = limits[k, 1]
-    for start in range(0, len(status), BLOCK):
-        end = min(start + BLOCK, len(status))
-        load_numbers(block, STATUS, status, start, end)
-        if n == 3:
-            judge_block(block, twist, contact, numbers, start, end, 3)
-        else:
-            judge_block(block, twist, contact, numbers, start, end, n)
-        for i in range(end - start):
-            verdict[start + i] = int(block[VERDICT, i])
+
+    @points_kernel(
+        f"({joints or 'n'},2),(points,6,{joints or 'n'}),(points),(points,w)->(points),(points,w)",
+        "f8 f8 u1 f8 u1 f8",
+    )
+    def footholds(limits, twist, status, contact, verdict, numbers):
+        n = joints or len(limits)
+        block = new_block(n, len(status))
+        for i in range(min(BLOCK, len(status))):
+            block[MU_E, i] = block[MU_FULL, i] = math.nan
+            for k in range(n):
+                block[row_of(LOWER, n, k), i] = limits[k, 0]
+                block[row_of(UPPER, n, k), i] = limits[k, 1]
+        for start in range(0, len(status), BLOCK):
+            end = min(start + BLOCK, len(status))
+            jacobian = twist[:, :3]
+            load_numbers(block, STATUS, status, start, end)
+            load(block, MU, contact, start, end, OF_CONTACT)
+            load(block, row_of(BIAS, n, 0), contact[:, OF_CONTACT:], start, end, n)
+            load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
+            load_columns(block, row_of(OMEGA, n, 0), twist[:, 3:], start, end, n)
+            for i in range(end - start):
+                prepare(block, i, n)
+            solve(block, jacobian, start, end, n)
+            if n == 3:
+                for i in range(end - start):
+                    rate_friction(block, i)
+            for i in range(end - start):
+                judge(block, i, n)
+            store(block, MU_E, numbers, start, end, OF_POINT - MU_E + n)
+            for i in range(end - start):
+                verdict[start + i] = int(block[VERDICT, i])
+
+    return footholds
 
 
-@inlined
-def judge_block(block, twist, contact, numbers, start, end, n):
-    """Judge points start to end, whose status is in the block."""
-    jacobian = twist[:, :3]
-    load(block, MU, contact, start, end, OF_CONTACT)
-    load(block, row_of(BIAS, n, 0), contact[:, OF_CONTACT:], start, end, n)
-    load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
-    load_columns(block, row_of(OMEGA, n, 0), twist[:, 3:], start, end, n)
-    for i in range(end - start):
-        prepare(block, i, n)
-    solve(block, jacobian, start, end, n)
-    if n == 3:
-        for i in range(end - start):
-            rate_friction(block, i)
-    for i in range(end - start):
-        judge(block, i, n)
-    store(block, MU_E, numbers, start, end, OF_POINT - MU_E + n)
+_quick_footholds = _footholds_kernel(solve_three, 3)
+_thorough_footholds = _footholds_kernel(solve_any, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from leg_kinematics.robot import Robot
+from leg_kinematics.robot import Leg, Robot
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.footholds import Contact, evaluate_footholds
@@ -18,13 +18,15 @@ def warm_up_statics(robot: Robot) -> None:
         posture = leg.mechanism.initial_posture
         evaluate_indices(leg.mechanism, posture)
         if leg.mechanism.has_point_foot:
-            lower, upper = leg.effort_limits.T
-            load_capacity(leg.mechanism.jacobian(posture), lower, upper, 0.4)
+            jacobian = leg.mechanism.jacobian(posture)
             feet = np.tile(posture.foot_position, (2, 1))
-            contact = Contact(friction=0.4, load=[0.0, 1e9])  # one that is too heavy
-            evaluate_footholds(leg, feet, contact)
-            evaluate_footholds(leg, feet[0], Contact(0.4))
-            utilisation(lower, leg.effort_limits)
+            # limits that bind, and those that never do, which only the thorough way takes
+            for tried in (leg, Leg.of(leg.mechanism)):
+                lower, upper = tried.effort_limits.T
+                load_capacity(jacobian, lower, upper, 0.4)
+                evaluate_footholds(tried, feet, Contact(0.4))
+                evaluate_footholds(tried, feet[0], Contact(0.4))
+            utilisation(leg.effort_limits[:, 0], leg.effort_limits)
     joints = [leg.mechanism.initial_posture.joint_positions for leg in robot.legs.values()]
     names, _ = robot.effort_limits()
     JointStream(robot, friction=0.4).read(names, np.concatenate(joints))

@@ -20,8 +20,10 @@ determinant of J, so singular poses need no exception: s = 0 means that the stru
 load. Paper 000, eqs (15)-(21), is the same question for unit efforts without friction.
 
 Kernels pose and solve their problems in blocks (see `leg_kinematics.kernels.blocks`), whose rows
-stand below: they load what is given, call `bear_moments`, `leave_room` and `solve`, and read what
-is found. `load_capacity` is such a kernel for given Jacobians.
+stand below: they load what is given, call `bear_moments`, `leave_room` and `solve_three` or
+`solve_any`, and read what is found. `load_capacity` is such a kernel for given Jacobians. Each is
+made twice, quick and thorough, of which the thorough one, whose code takes long to compile, is
+called only for legs and points that need it.
 """
 
 # The compiler infers the types of the scalar code below; only what Python calls is annotated.
@@ -30,6 +32,7 @@ is found. `load_capacity` is such a kernel for given Jacobians.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +57,7 @@ from leg_statics.capacity.planes import CapacityStatus as CapacityStatus
 from leg_statics.capacity.three_joint import three_joint_capacity
 from leg_statics.efforts import worst_moment_effort
 
+UNCERTAIN = 254  # instead of a `CapacityStatus`, where the quick way does not tell
 UP = np.array([0.0, 0.0, 1.0])
 UP.flags.writeable = False
 
@@ -133,6 +137,51 @@ def load_capacity(
     return result
 
 
+def _load_capacity(
+    jacobian: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    bias: FloatArray,
+    friction: FloatArray,
+    normal: FloatArray,
+) -> Any:
+    """Return the fields of `LoadCapacity`."""
+    arguments = (jacobian, lower, upper, bias, friction, normal)
+    if jacobian.shape[-1] != 3:
+        return _thorough_capacity(*arguments)
+    results = _quick_capacity(*arguments)
+    if not has_code(results[-1], UNCERTAIN):
+        return results
+    inputs = zip(arguments, (2, 1, 1, 1, 0, 1), strict=True)
+    return settled(results, results[-1] == UNCERTAIN, _thorough_capacity, *inputs)
+
+
+def settled(
+    results: tuple[Any, ...],
+    uncertain: Any,
+    thorough: Callable[..., Any],
+    *inputs: tuple[Any, int],
+) -> tuple[Any, ...]:
+    """Return the results of a quick kernel, what it left open replaced by those of a thorough one.
+
+    Args:
+        results: Results of the quick kernel (..., any).
+        uncertain: Which points it left open (...).
+        thorough: The thorough kernel.
+        *inputs: What it takes (..., any), and how many axes that of one point has.
+    """
+    if not uncertain.ndim:  # as points, so that the code for one is never compiled
+        found = thorough(*[np.expand_dims(array, 0) for array, _ in inputs])
+        return tuple(result[0] for result in found)
+    chosen = [
+        np.broadcast_to(array, uncertain.shape + array.shape[array.ndim - axes :])[uncertain]
+        for array, axes in inputs
+    ]
+    for result, settled_points in zip(results, thorough(*chosen), strict=True):
+        result[uncertain] = settled_points
+    return results
+
+
 def check_effort_limits(lower: FloatArray, upper: FloatArray) -> None:
     """Raise a ValueRangeError unless every joint has an effort between its limits."""
     for name, limit, wrong in (
@@ -164,12 +213,12 @@ def check_normals(name: str, vectors: FloatArray) -> None:
 # Rows of a block. What a contact gives, in its order (see `Contact`): friction, normal, the load
 # and the moments that must be borne;
 MU, NORMAL, LOAD, MOMENT, ANY_MOMENT, OF_CONTACT = 0, 1, 4, 5, 8, 9
-# what is found besides capacity and force: whether a solution is wanted and whether the quick one
-# is certain, capacity without friction limit, limiting joint, force on the cone, status;
-WANTED, CERTAIN, ROUGH, JOINT, ON_CONE, OUTCOME = 9, 10, 11, 12, 13, 14
+# whether a solution is wanted, and what is found besides capacity and force: capacity without
+# friction limit, limiting joint, force on the cone, status;
+WANTED, ROUGH, JOINT, ON_CONE, OUTCOME = 9, 10, 11, 12, 13
 # eight rows are the caller's;
-OF_CALLER = 15
-CAPACITY, FORCE, OF_POINT = 23, 24, 27
+OF_CALLER = 14
+CAPACITY, FORCE, OF_POINT = 22, 23, 26
 # then what n joints have, each row n times: efforts without load, limits, bias, reserve, room;
 # columns of both Jacobians (3 n).
 EFFORT, LOWER, UPPER, BIAS, RESERVE, ROOM_UP, ROOM_DOWN = range(7)
@@ -188,7 +237,7 @@ def new_block(n, points):
     """Return a block for problems with n joints, of which so many are to be solved: no load yet."""
     block = np.empty((OF_POINT + OF_JOINT * n, BLOCK))
     for i in range(min(BLOCK, points)):
-        block[LOAD, i], block[WANTED, i], block[CERTAIN, i] = 0.0, 1.0, 0.0
+        block[LOAD, i], block[WANTED, i] = 0.0, 1.0
     return block
 
 
@@ -234,34 +283,31 @@ def leave_room(block, i, n):
 
 
 @inlined
-def solve(block, jacobian, start, end, n):
-    """Solve problems start to end, quickly where that is certain, by all planes elsewhere."""
-    if n == 3:
-        for i in range(end - start):
-            _solve_three(block, i)
+def solve_three(block, jacobian, start, end, n):
+    """Solve problems start to end, of three joints, quickly; UNCERTAIN is what remains open."""
     for i in range(end - start):
-        if block[WANTED, i] == 1.0 and block[CERTAIN, i] == 0.0:
-            _solve_any(block, i, n, jacobian[start + i])
+        columns = (
+            get3(block, row_of(J, 3, 0), i),
+            get3(block, row_of(J, 3, 1), i),
+            get3(block, row_of(J, 3, 2), i),
+        )
+        up, down = get3(block, row_of(ROOM_UP, 3, 0), i), get3(block, row_of(ROOM_DOWN, 3, 0), i)
+        axes = load_axes(get3(block, NORMAL, i))
+        found = three_joint_capacity(columns, up, down, block[MU, i], axes)
+        block[CAPACITY, i] = found.capacity
+        put(block, FORCE, i, found.force)
+        block[ROUGH, i] = found.rough
+        block[JOINT, i] = found.limiting_joint
+        block[ON_CONE, i] = 1.0 if found.friction_limited else 0.0
+        block[OUTCOME, i] = BOUNDED if found.certain else UNCERTAIN
 
 
 @inlined
-def _solve_three(block, i):
-    """Solve a problem with three joints if that is quick."""
-    columns = (
-        get3(block, row_of(J, 3, 0), i),
-        get3(block, row_of(J, 3, 1), i),
-        get3(block, row_of(J, 3, 2), i),
-    )
-    up, down = get3(block, row_of(ROOM_UP, 3, 0), i), get3(block, row_of(ROOM_DOWN, 3, 0), i)
-    axes = load_axes(get3(block, NORMAL, i))
-    found = three_joint_capacity(columns, up, down, block[MU, i], axes)
-    block[CAPACITY, i] = found.capacity
-    put(block, FORCE, i, found.force)
-    block[ROUGH, i] = found.rough
-    block[JOINT, i] = found.limiting_joint
-    block[ON_CONE, i] = 1.0 if found.friction_limited else 0.0
-    block[CERTAIN, i] = 1.0 if found.certain else 0.0
-    block[OUTCOME, i] = BOUNDED
+def solve_any(block, jacobian, start, end, n):
+    """Solve problems start to end, of any number of joints, by all planes."""
+    for i in range(end - start):
+        if block[WANTED, i] == 1.0:
+            _solve_any(block, i, n, jacobian[start + i])
 
 
 @scalar
@@ -306,53 +352,54 @@ def load_axes(normal):
 # --------------------------------------------------------------------------- given Jacobians
 
 
-@points_kernel(
-    "(points,3,n),(points,n),(points,n),(points,n),(points),(points,3)->(points),(points,3),(points),(points),(points)",
-    "f8 f8 f8 f8 f8 f8 f8 f8 i8 b1 u1",
-)
-def _load_capacity(
-    jacobian: Any,
-    lower: Any,
-    upper: Any,
-    bias: Any,
-    friction: Any,
-    normal: Any,
-    capacity: Any,
-    force: Any,
-    limiting_joint: Any,
-    friction_limited: Any,
-    status: Any,
-) -> None:
-    """Solve points in blocks; with three joints the number is a constant for the compiler."""
-    n = jacobian.shape[2]
-    block = new_block(n, len(jacobian))
-    for i in range(min(BLOCK, len(jacobian))):
-        for k in range(n):
-            block[row_of(RESERVE, n, k), i] = 0.0
-    for start in range(0, len(jacobian), BLOCK):
-        end = min(start + BLOCK, len(jacobian))
-        load_numbers(block, MU, friction, start, end)
-        load(block, NORMAL, normal, start, end, 3)
-        if n == 3:
-            _solve_block(block, jacobian, lower, upper, bias, start, end, 3)
-        else:
-            _solve_block(block, jacobian, lower, upper, bias, start, end, n)
-        for i in range(end - start):
-            k = start + i
-            capacity[k] = block[CAPACITY, i]
-            force[k, 0], force[k, 1], force[k, 2] = get3(block, FORCE, i)
-            limiting_joint[k] = int(block[JOINT, i])
-            friction_limited[k] = block[ON_CONE, i] == 1.0
-            status[k] = int(block[OUTCOME, i])
+def _capacity_kernel(solve: Callable[..., None], joints: int) -> Callable[..., Any]:
+    """Return a kernel that solves problems of so many joints, a constant, or of any if 0."""
+    joint = f"(points,{joints or 'n'})"
+
+    @points_kernel(
+        f"(points,3,{joints or 'n'}),{joint},{joint},{joint},(points),(points,3)"
+        "->(points),(points,3),(points),(points),(points)",
+        "f8 f8 f8 f8 f8 f8 f8 f8 i8 b1 u1",
+    )
+    def capacity(
+        jacobian: Any,
+        lower: Any,
+        upper: Any,
+        bias: Any,
+        friction: Any,
+        normal: Any,
+        capacity: Any,
+        force: Any,
+        limiting_joint: Any,
+        friction_limited: Any,
+        status: Any,
+    ) -> None:
+        n = joints or jacobian.shape[2]
+        block = new_block(n, len(jacobian))
+        for i in range(min(BLOCK, len(jacobian))):
+            for k in range(n):
+                block[row_of(RESERVE, n, k), i] = 0.0
+        for start in range(0, len(jacobian), BLOCK):
+            end = min(start + BLOCK, len(jacobian))
+            load_numbers(block, MU, friction, start, end)
+            load(block, NORMAL, normal, start, end, 3)
+            load(block, row_of(LOWER, n, 0), lower, start, end, n)
+            load(block, row_of(UPPER, n, 0), upper, start, end, n)
+            load(block, row_of(EFFORT, n, 0), bias, start, end, n)
+            load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
+            for i in range(end - start):
+                leave_room(block, i, n)
+            solve(block, jacobian, start, end, n)
+            for i in range(end - start):
+                k = start + i
+                capacity[k] = block[CAPACITY, i]
+                force[k, 0], force[k, 1], force[k, 2] = get3(block, FORCE, i)
+                limiting_joint[k] = int(block[JOINT, i])
+                friction_limited[k] = block[ON_CONE, i] == 1.0
+                status[k] = int(block[OUTCOME, i])
+
+    return capacity
 
 
-@inlined
-def _solve_block(block, jacobian, lower, upper, bias, start, end, n):
-    """Solve points start to end, whose friction and normals are in the block."""
-    load(block, row_of(LOWER, n, 0), lower, start, end, n)
-    load(block, row_of(UPPER, n, 0), upper, start, end, n)
-    load(block, row_of(EFFORT, n, 0), bias, start, end, n)
-    load_columns(block, row_of(J, n, 0), jacobian, start, end, n)
-    for i in range(end - start):
-        leave_room(block, i, n)
-    solve(block, jacobian, start, end, n)
+_quick_capacity = _capacity_kernel(solve_three, 3)
+_thorough_capacity = _capacity_kernel(solve_any, 0)
