@@ -47,7 +47,6 @@ INVALID_INPUT = int(CapacityStatus.INVALID_INPUT)
 ROUNDING = 1e-15  # of a·(x, y, 1) relative to its factors
 POWERLESS = 1e-6  # b below which rounding of (x, y) blurs the s at which a plane is met
 VAST = 1e100  # limits beyond it are no limits, and none below its reciprocal is left
-SOLVED = 1e-9  # residual of planes that should meet in a point, relative to their factors
 
 
 @scalar
@@ -133,7 +132,7 @@ def _planes(jacobian, up, down, axes):
 @scalar
 def _room_per_length(room, size):
     """Return b of a plane: infinite if it never binds, minus infinity if it always forbids."""
-    b = room / size if size > 0.0 else math.copysign(math.inf, room)
+    b = room / size if size > 0.0 else (math.inf if room >= 0.0 else -math.inf)
     if abs(b) > VAST:
         return math.copysign(math.inf, b)
     return b if abs(b) > 1.0 / VAST else 0.0
@@ -166,16 +165,19 @@ def _search(planes, mu):
     best, s, cause, square = -1, math.inf, 0, math.inf
     for c in range(candidates.shape[0]):
         candidate = candidates[c]
-        if candidate[2] > s * (1.0 + SAME) and not forbids:
+        own = candidate[2]
+        if own < 0.0 or (own > s * (1.0 + SAME) and not forbids) or math.isnan(candidate[0]):
             continue
-        lowest, highest, raised_by = _range_above(planes, candidate)
+        lowest, highest, lowest_row = _range_above(planes, candidate[0], candidate[1])
         if lowest == math.inf:
             continue
         largest = max(largest, highest)
         away = candidate[0] * candidate[0] + candidate[1] * candidate[1]
         nearer = lowest <= s * (1.0 + SAME) and away < square * (1.0 - SAME)
         if lowest < s * (1.0 - SAME) or nearer:
-            best, s, cause, square = c, lowest, raised_by, away
+            best, s, square = c, lowest, away
+            meets = abs(own - lowest) <= SAME * lowest
+            cause = 0 if meets else lowest_row
     if best < 0:  # no direction is open to a force: only the zero force is left, if admissible
         return math.inf, 0.0, 0.0, _powerless(planes), mu < math.inf, largest
     joint = _joint_of(cause) if cause > 0 else _heaviest(planes, candidates[best])
@@ -254,7 +256,8 @@ def _chord(planes, i, j, mu):
     ey = bj * planes[i, 1] - bi * planes[j, 1]
     ez = bj * planes[i, 2] - bi * planes[j, 2]
     square = ex * ex + ey * ey
-    chord = mu * mu * square - ez * ez
+    reach = mu * math.sqrt(square)
+    chord = (reach - ez) * (reach + ez)
     if square == 0.0 or not chord >= -SAME * ez * ez:
         return math.nan, math.nan, math.nan, math.nan
     half = math.sqrt(max(chord, 0.0)) / square if mu < math.inf else math.nan
@@ -282,7 +285,7 @@ def _vertex(planes, i, j, k, mu):
         x = (on_a * a[0] + on_b * b[0] + on_c * c[0]) / z
         y = (on_a * a[1] + on_b * b[1] + on_c * c[1]) / z
         s = 1.0 / z
-    if not x * x + y * y <= mu * mu:
+    if not math.hypot(x, y) <= mu:
         return math.nan, math.nan, math.nan
     return x, y, s
 
@@ -295,38 +298,28 @@ def _without(b, a):
 
 
 @scalar
-def _range_above(planes, candidate):
-    """Return the least and the largest admissible s at a candidate, and the plane that raised it.
+def _range_above(planes, x, y):
+    """Return the least and the largest admissible s at a point, and the plane that bounds it below.
 
-    Planes with b > 0 may raise s above the meeting of the candidate's own planes. It is infinite
-    if planes with b <= 0 forbid it, or if the own planes do not meet there but for rounding.
+    The least is infinite if planes with b <= 0 forbid every s. What exceeds a plane by rounding
+    only does not exceed it.
     """
-    x, y, own = candidate[0], candidate[1], candidate[2]
-    refused = math.inf, 0.0, 0
-    if not 0.0 <= own < math.inf:
-        return refused
-    i, j, k = int(candidate[3]), int(candidate[4]), int(candidate[5])
-    size = math.sqrt(1.0 + x * x + y * y)
-    lowest, highest, raised_by = own, math.inf, 0
+    rounding = ROUNDING * math.sqrt(1.0 + x * x + y * y)
+    lowest, highest, lowest_row = 0.0, math.inf, 0
     for row in range(1, planes.shape[0]):
         value, b = dot(planes[row], x, y), planes[row, 3]
-        if row in (i, j, k):
-            if not abs(value - b * own) <= SOLVED * (size + abs(b) * own):
-                return refused
-            if b < POWERLESS:
-                continue
-        if b > 0.0 and value - ROUNDING * size > b * lowest:
-            lowest, raised_by = value / b, row
-    for row in range(1, planes.shape[0]):
-        value, b = dot(planes[row], x, y), planes[row, 3]
-        if b < 0.0:
-            highest = min(highest, (value + ROUNDING * size) / b)
-        own_joint = _joint_of(row) in (_joint_of(i), _joint_of(j), _joint_of(k))
-        held = own_joint and (raised_by == 0 or b == 0.0)
-        fits = value - b * lowest <= 10.0 * ROUNDING * (size - b * lowest)
-        if b <= 0.0 and not held and not fits:
-            return refused
-    return lowest, highest, raised_by
+        if b > 0.0:
+            # the s at which a plane of little power is met is blurred by the rounding of (x, y)
+            s = (value - rounding if b < POWERLESS else value) / b
+            if value > rounding and s > lowest:
+                lowest, lowest_row = s, row
+        elif value > rounding:
+            return math.inf, 0.0, row
+        elif b < 0.0:
+            highest = min(highest, (value - rounding) / b if value < -rounding else 0.0)
+    if lowest > highest * (1.0 + SAME):
+        return math.inf, 0.0, lowest_row
+    return lowest, highest, lowest_row
 
 
 @scalar
