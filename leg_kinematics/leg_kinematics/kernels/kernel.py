@@ -22,23 +22,20 @@ edits of the file in which the kernel stands.
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import hashlib
 import os
 import sys
-import tempfile
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
 
 import numba
 import numpy as np
 from numba.extending import register_jitable
+
+from leg_kinematics.kernels.cache import cache_folder, process_lock
 
 # To Python such functions are what they were; kernels compile them without what a call from Python
 # would need, which takes as long again. numpy's error model: in a kernel a division by zero yields
@@ -104,8 +101,8 @@ def compile_or_load(
         name: Name of the function that is compiled, if it is one around the kernel's.
         source: Source of that function.
     """
-    folder = _cache_folder(function, source)
-    with _thread_lock, _process_lock(folder):
+    folder = cache_folder(_digest(function, source))
+    with _thread_lock, process_lock(folder):
         if folder is None or not any(folder.rglob(f"*{name or function.__name__}-*.nbi")):
             what = ".".join(filter(None, (function.__module__, function.__qualname__, name)))
             print(f"compiling {what} for this machine (once)", file=sys.stderr, flush=True)
@@ -125,36 +122,6 @@ def kernel(layout: str, types: str) -> Callable[[Callable[..., None]], Kernel]:
         types: numba types of the arguments in the same order, e.g. "f8[:], f8, f8[:]".
     """
     return lambda function: Kernel(function, layout, types)
-
-
-def _cache_folder(function: Callable[..., None], source: str) -> Path | None:
-    """Return a writable folder for the compiled code of `function`, or None without one."""
-    roots = [os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME"), "~/.cache"]
-    for root in filter(None, roots):
-        folder = Path(root).expanduser() / "leg_kernels" / _digest(function, source)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    warnings.warn("no writable cache folder: kernels compile anew in every process", stacklevel=2)
-    return None
-
-
-@contextlib.contextmanager
-def _process_lock(folder: Path | None) -> Iterator[None]:
-    """Let one process at a time compile into a folder; the others then load what it compiled.
-
-    Without it, nodes that start together write over each other's files, and numba loads machine
-    code under an index that belongs to another compilation.
-    """
-    if folder is None:
-        yield
-        return
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # closing the file gives it back
-        yield
 
 
 def _digest(function: Callable[..., None], source: str) -> str:
