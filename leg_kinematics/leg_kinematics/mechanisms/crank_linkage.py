@@ -222,7 +222,7 @@ class CrankLinkage(Dimensioned):
         foot = as_array("foot_position", foot_position, 3)
         mode = self.mode_index(assembly_mode)
         with np.errstate(over="ignore"):  # infinitely far is far enough
-            x, y = -foot[..., 1] / self.crank_length, foot[..., 2] / self.crank_length
+            x, y = -foot[..., 0] / self.crank_length, foot[..., 2] / self.crank_length
         lower, upper = near_brackets(self._curves[mode], x, y)
         angles, distances = self.kernels.nearest(
             self._constants, self.sides[mode], x[..., None], y[..., None], lower, upper
