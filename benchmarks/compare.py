@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Show how measured values changed against a saved baseline."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every entry measures with: timing, medians with p95, goals, rows of the table."""
 
 from __future__ import annotations

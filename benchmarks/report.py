@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rows as a table and as JSON, and what a result must carry to be understood later."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the entries with nodes share: nodes as processes and a client in this one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the suite and its peers; print a table and save the numbers."""
 
 from __future__ import annotations

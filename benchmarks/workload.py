@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inputs that the entries share: one leg of the hexapod and random poses of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ask one question: can this leg stand there, and how much does it carry?
 
 Start the nodes with `make run`; then, in another terminal:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rank 10,000 candidate footholds of a leg in one call, and see why the others fail.
 
 Start the nodes with `make run`; then, in another terminal:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choose body height and step length for ice, wood and cement, for all legs together.
 
 Start the nodes with `make run`; then, in another terminal:

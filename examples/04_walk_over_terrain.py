@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A gait planner node: walks the hexapod over a map of terrain, asking the nodes at every step.
 
 Start the nodes with `make run`; then, in another terminal:

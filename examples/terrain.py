@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A map of terrain: rectangular patches of ground at different heights, read from a YAML file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A tripod gait over terrain: which footholds, how long a step, how high the body.
 
 The legs step in two tripods. While one tripod carries the body along +x of the map at constant yaw,

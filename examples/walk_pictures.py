@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of a walk: terrain and footholds from above, and what limits each step."""
 
 from __future__ import annotations

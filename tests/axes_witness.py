@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every service answers on random points, condensed, in the leg frames of the first release.
 
 Leg frames had y forward and x to the right before they followed REP-103. `observe` asks the nodes

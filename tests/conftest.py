@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Real node processes for the tests, in a ROS domain of their own on this machine only."""
 
 import os

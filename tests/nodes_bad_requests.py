@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Requests that the nodes must refuse: one line each."""
 
 # ruff: noqa: E501

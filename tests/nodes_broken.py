@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node whose callbacks fail, and that logs by Python's `logging`; the tests run it."""
 
 import contextlib

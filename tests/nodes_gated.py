@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A maps node that computes a map of a workspace only as far as the test that runs it lets it.
 
 Every line on standard input is the number of planes that may pass the gate from then on; it is

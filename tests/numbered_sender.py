@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishes numbered joint states of legs at a steady rate, one topic a leg, and tells how many.
 
 Arguments: rate [Hz], duration [s], topics. The number stands in the stamp; a warm-up has number 0.

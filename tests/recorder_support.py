@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the tests of the recorder and its soak share: the command as a process, and a sender."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command search_geometry, held after as many designs as its first argument says.
 
 It then prints "held", and goes on when its standard input has a line or ends.

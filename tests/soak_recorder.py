@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A minute at 1 kHz for six legs, without a message lost: `make soak`.
 
 Too long for the tests, which check that what is lost is counted. The machine should do nothing

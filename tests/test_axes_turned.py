@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames of legs follow REP-103, and nothing else has changed: every service, 10,000 points a leg.
 
 `axes_witness` tells what tests/data/former_axes.npz holds and where it comes from.

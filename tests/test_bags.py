@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings are read in whatever shape they come: packed, split, cut off, corrupt."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the docs name is there: modules and functions, files of recipes, pages of links."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples as a newcomer runs them: as programs, against real nodes."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The offline judge says of a recording what the library says of each of its messages."""
 
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Who may import whom: imports run downward, without a circle, and the mathematics knows no ROS.
 
 The layers are those of the table in docs/architecture.md.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The designs node: searches as an action, with progress, cancellation and bad studies."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faults of a node's own code, and floods of bad input: the node lives on, and its log is short."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes that start, stop, restart and change their robot; clients that live through it."""
 
 import ast

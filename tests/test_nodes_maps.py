@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The maps node: planes, whole workspaces with progress and cancellation, clouds and markers."""
 
 import math

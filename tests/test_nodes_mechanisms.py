@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One robot with a leg of every mechanism: the same services answer for all of them."""
 
 from types import SimpleNamespace

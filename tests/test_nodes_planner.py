@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a gait planner asks: footholds and steps, equal to the library's, and clear refusals."""
 
 import array

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The services of the nodes: the library's answers, and clear refusals."""
 
 import math

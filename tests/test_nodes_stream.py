@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint states in, leg states out: what the statics node makes of a stream, good or bad."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a package promises outside its code: manifests, entry points, interfaces, clean files."""
 
 import ast
@@ -34,6 +35,7 @@ FROM_PYPI = {
     "rosbags": "rosbags",
 }
 
+LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 MACHINE_PATH = re.compile(r"(?<![\w.}/])/(root|home|work|Users)/\w")
 REGISTRY = re.compile(r"pypi\.org|python[h]osted|npm[j]s|--(extra-)?index[-]url|/simpl[e]/")
 
@@ -161,6 +163,13 @@ def test_interface_is_built_with_the_declared_names(path):
         for declaration, _ in declarations(path)
     }
     assert declared <= built
+
+
+def test_every_source_file_names_its_licence():
+    sources = [path for path in versionable_files() if path.suffix in (".py", ".cmake")]
+    assert sources
+    nameless = [path for path in sources if not path.read_text().startswith(LICENCE)]
+    assert nameless == []
 
 
 def test_no_file_names_a_machine_path_or_a_registry():

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded queries of planners, answered again offline, give what the node answered."""
 
 import shutil

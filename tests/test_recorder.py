@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of live topics: complete, standard, safe from kills and full disks."""
 
 import re

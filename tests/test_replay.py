@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings played into live nodes give what the library gives; the kit tells what differs."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs on one machine do not meet in a ROS domain, nor does one meet what another left."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command search_geometry as a process: killed, interrupted, refused."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What nodes answer, what the client asks and what the judge answers again: the same services."""
 
 import array

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the suite answers: start nodes, ask them, walk over a terrain, draw pictures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Make the recordings that the tests play and judge: walks that nobody had to record.
 
     python tools/make_golden_bags.py [FOLDER]      (default: tests/bags)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The nodes of one robot as processes of this machine."""
 
 from __future__ import annotations

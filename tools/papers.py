@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Put every published number, claim and figure beside what this suite computes.
 
 Prints one table a paper and writes a report with the pictures. Nothing in it is typed by hand.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A ROS domain to oneself: without another run on this machine, or a node that one left behind.
 
 It needs no ROS, and must be called before anything loads it.

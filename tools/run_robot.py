@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the nodes of one robot, and stop them at Ctrl-C."""
 
 from __future__ import annotations

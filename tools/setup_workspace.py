@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Make the workspace usable from a bare machine: virtual environment, dependencies, packages.
 
 Run it with the Python the workspace shall use; `make` does so before every target. It does only

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compile the kernels of a shipped robot into the cache; needs no ROS."""
 
 import sys

@@ -1,3 +1,5 @@
+# SPDX-License-Identifier: Apache-2.0
+
 # What building interfaces against the `ros-jazzy-*` wheels wants beyond a plain build. A ROS installed by the
 # system does not need this file. Use: cmake -DCMAKE_PROJECT_INCLUDE=<this file>
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The least a node can do, run as the suite's nodes are: services without work and a relay."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prints the seconds until imports were done and until the first foothold was, as JSON."""
 
 import time

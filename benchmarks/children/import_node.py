@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prints the seconds that a node takes to import, as JSON."""
 
 import time

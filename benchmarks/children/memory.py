@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evaluates many footholds and prints how much memory that took at most [B].
 
 Arguments: number of points, points in one call.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishes joint states of the hexapod at a steady rate and tells how many.
 
 Arguments: rate [Hz], duration [s]. Messages with a stamp of zero are a warm-up.

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """One module for each entry of the table, with a function `rows(settings)`."""

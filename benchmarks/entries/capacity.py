@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity with the true friction cone against conic and linear solvers."""
 
 from __future__ import annotations

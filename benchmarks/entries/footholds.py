@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Footholds from position to verdict: kinematics, Jacobians, rated friction and capacity."""
 
 from __future__ import annotations

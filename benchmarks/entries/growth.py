@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time per point and memory by the number of points in a call."""
 
 from __future__ import annotations

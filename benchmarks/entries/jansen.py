@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Theo Jansen's linkage over crank angles against pylinkage."""
 
 from __future__ import annotations

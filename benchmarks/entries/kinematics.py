@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inverse kinematics of the parallel-driving leg against Newton's method with Pinocchio."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Index map of the whole workspace with a million points."""
 
 from __future__ import annotations

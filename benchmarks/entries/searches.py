@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry search: designs a second by number of worker processes."""
 
 from __future__ import annotations

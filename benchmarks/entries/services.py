@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Service round trips: one point against an empty service, and where the time of 10,000 goes."""
 
 from __future__ import annotations

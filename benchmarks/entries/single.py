@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One point through the public functions: what a planner pays that asks point by point."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a new process waits for: imports, cached machine code, or the compiler."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint states of six legs at 1 kHz through the statics node, and through a bare relay."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parallel-driving leg in Pinocchio: a tree of nine joints, closed by equations.
 
 Joints are the three cranks, the platform's universal joint on the centre crank (2), the swing at

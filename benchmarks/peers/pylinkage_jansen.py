@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Jansen's linkage in pylinkage, which steps a crank through a turn with compiled code."""
 
 from __future__ import annotations

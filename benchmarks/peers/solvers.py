@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity by general solvers, set up once for a leg and fed one Jacobian after the other.
 
 All maximise F_z subject to lower <= -Jᵀ F <= upper and a friction cone or a pyramid in place of it.

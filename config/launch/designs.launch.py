@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the node that searches for geometries: `ros2 launch leg_bringup designs.launch.py`."""
 
 from launch import LaunchDescription

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the nodes of one robot: `ros2 launch leg_bringup leg_suite.launch.py robot:=hexapod`."""
 
 from pathlib import Path

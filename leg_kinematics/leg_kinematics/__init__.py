@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kinematics of legs with closed kinematic chains; needs numpy, scipy and numba, not ROS."""
 
 from typing import TYPE_CHECKING

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrays: checks of arguments, one place for the shape rule of the suite, and angles.
 
 Every public function takes arrays with any leading batch axes; only the trailing axes are fixed.

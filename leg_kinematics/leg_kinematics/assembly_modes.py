@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assembly modes of closed chains whose parts can each be assembled in two ways."""
 
 from __future__ import annotations

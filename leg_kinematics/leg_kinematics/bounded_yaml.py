@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML whose reading cannot take long or much memory, whoever wrote it.
 
 A few lines can stand for gigabytes, by aliases of aliases, and a file may be of any size or depth.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Condition number of Jacobians, equation (3) of paper 000: ratio of the singular values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robot descriptions: YAML in the units of its author to a `Robot` in SI, with every mistake named.
 
 A file has this form (lengths and angles in the units it states, efforts in N.m or N):

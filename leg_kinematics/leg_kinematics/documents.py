@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML documents whose mistakes are all told with file, line, key, value and what is allowed.
 
 They come from other people and other machines, so what reading one may cost has bounds.

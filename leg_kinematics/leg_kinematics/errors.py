@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exceptions for misuse; what happens to single points of a batch is told by a `Status`."""
 
 from __future__ import annotations

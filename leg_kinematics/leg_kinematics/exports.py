@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What `leg_kinematics` offers to those who use it in their own process."""
 
 from leg_kinematics.description import load_robot

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that people name: where they are, and their text if it is a file of a sensible size."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The foot curve of a leg driven by one crank, and how a unit of two such legs walks on it.
 
 The two legs of a unit share a frame and their cranks stand half a turn apart, so the lower foot

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry parameters of a mechanism: declared as fields of its dataclass, checked, as an array."""
 
 from __future__ import annotations

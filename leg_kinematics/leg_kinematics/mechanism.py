@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every leg mechanism offers: the one protocol that all layers above are written against."""
 
 from __future__ import annotations

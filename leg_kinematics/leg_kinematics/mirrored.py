@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The mirror image of a mechanism, so that left and right legs share one geometry."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A robot: named legs, each a mechanism mounted on a body."""
 
 from __future__ import annotations

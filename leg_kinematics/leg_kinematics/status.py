@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outcome of one point of a batched computation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The mechanisms that tests of the protocol are made with: defaults, mirror images, variations."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What `TheoJansen` and `SixBar` have in common: lengths, rates, passes of the foot, limits."""
 
 from __future__ import annotations

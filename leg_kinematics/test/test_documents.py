@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Documents from anywhere: read within a second, or refused with file, what it was, what may be."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`DoubleRhombus` against its own inverse, finite differences, virtual work and its bar lengths."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The textbook's linkage parts: lengths, sides and rates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entry points of the nodes: quiet while the heavy modules load."""
 
 from __future__ import annotations

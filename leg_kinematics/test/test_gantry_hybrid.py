@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`GantryHybrid` against its own inverse, finite differences, statics and the paper's example."""
 
 from __future__ import annotations

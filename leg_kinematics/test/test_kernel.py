@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels: broadcasting, and a cache that notices edits of the code a kernel calls."""
 
 from __future__ import annotations

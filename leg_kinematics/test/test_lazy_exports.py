@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the package exports is there when it is asked for, and nothing else is."""
 
 import pytest

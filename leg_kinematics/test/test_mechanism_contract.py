@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the protocol promises, of every registered mechanism and of its mirror image."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The log of a node: throttled, counted, and open to Python's own logging."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`ParallelDrive` against the paper, finite differences, its own inverse and its bar lengths."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Positions of passive joints against the points of the linkage, closed loops and paths."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels over points: any leading axes, any memory, checked lengths, the types of the layout."""
 
 from __future__ import annotations

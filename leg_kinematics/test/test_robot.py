@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Legs: those of a robot, and one by itself."""
 
 import numpy as np

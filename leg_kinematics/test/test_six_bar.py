@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`SixBar`: equation (5) of the paper, its numbers, and the walker made of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`TheoJansen` against pylinkage, an independent simulator, and the paper's numbers."""
 
 from __future__ import annotations

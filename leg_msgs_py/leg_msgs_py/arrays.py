@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numpy arrays in and out of message fields, by buffer and never element by element.
 
 A batch travels as a flat, row-major field: an array (..., k) becomes a field of k·N numbers.

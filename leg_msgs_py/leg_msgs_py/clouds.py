@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numpy in and out of `sensor_msgs/PointCloud2`, by buffer and never point by point."""
 
 from __future__ import annotations

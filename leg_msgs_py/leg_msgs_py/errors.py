@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One exception for each way a request can fail."""
 
 from __future__ import annotations

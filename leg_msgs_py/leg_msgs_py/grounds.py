@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a foot stands on, as a gait planner says it."""
 
 from __future__ import annotations

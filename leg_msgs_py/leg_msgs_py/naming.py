@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How services and actions are named: as their types are, in snake case."""
 
 from __future__ import annotations

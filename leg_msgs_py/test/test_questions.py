@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A question of the client is said once: its help, its two forms and what it sends."""
 
 import inspect

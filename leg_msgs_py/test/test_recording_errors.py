@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whoever catches `RecordingError` catches whatever recordings can fail with."""
 
 import importlib

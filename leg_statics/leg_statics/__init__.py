@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a leg can carry: efforts, indices, load capacity, friction and step length; without ROS."""
 
 from typing import TYPE_CHECKING

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts: what a foot stands on and what it has to bear there."""
 
 from __future__ import annotations

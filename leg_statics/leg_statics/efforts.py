@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuator efforts that hold a foot against the ground: equations (5)-(7) of paper 000.
 
 The papers' F_C and M_C are what the foot exerts. Throughout the suite a wrench is what the ground

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What `leg_statics` offers to those who use it in their own process."""
 
 from leg_statics.capacity.problem import CapacityStatus, LoadCapacity, load_capacity

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Footholds: can the leg reach it, what does it carry there, and if not enough, why not."""
 
 from __future__ import annotations

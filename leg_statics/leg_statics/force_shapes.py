@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of forces at a foot, for drawing: the friction cone and what the actuators can give."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grounds by name: the range of static friction that each offers to the foot."""
 
 from __future__ import annotations

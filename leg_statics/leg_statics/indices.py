@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Performance indices of a leg posture, and the registry by which services and maps name them.
 
 Equations are those of paper 000 (Zhang, Jin, Zhang 2017) where no other paper is named.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the joints of a robot's legs stand in a stream of joint states."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint states in, leg states out: the same for a live stream and for a recording.
 
 A stream is made for a robot with the limits in force, and reads one message or many at once:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solved postures of a leg with their Jacobians: what all statics is computed from."""
 
 from __future__ import annotations

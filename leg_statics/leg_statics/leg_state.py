@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The state of legs at given joint positions: where the feet are and what they can carry."""
 
 # The compiler infers the types of the kernel below; only what Python calls is annotated.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Index maps as jobs in a thread, with progress and cancellation, and a memory of the last ones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Index maps: every index of a leg over a line or plane of the workspace or over all of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Force indices of planar mechanisms with two actuators, by the extreme values of the foot force.
 
 With v = J q' the foot exerts F = N Q by the actuator efforts Q, N = J^-T (paper 001, eq. 22). Over

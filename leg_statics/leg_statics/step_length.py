@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Step length: the longest straight stance of a foot on which every point is feasible.
 
 During stance the foot moves along a straight line relative to the body, at constant height. The

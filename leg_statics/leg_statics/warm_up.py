@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compile, or load from the cache, the kernels of a robot's statics before the first question."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The workspace of a leg: grids over the actuators' ranges, its volume, bounds, heights, sections.
 
 An integral over the foot's workspace W is one over the actuator ranges, with dW = |det J| dq; there

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests import what they share from modules beside them."""
 
 import sys

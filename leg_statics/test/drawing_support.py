@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a figure shows: its panels, colours and texts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Claims about the load capacity, checked against independent solvers and exact properties."""
 
 from __future__ import annotations

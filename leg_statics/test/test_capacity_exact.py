@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity against exact arithmetic, where planes pass through zero or many meet in a point.
 
 The oracle enumerates in rational and 60-digit arithmetic. It works with the force itself, not with

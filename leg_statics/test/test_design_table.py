@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table on disk: exact, locked, and what is left of it after an accident."""
 
 import contextlib

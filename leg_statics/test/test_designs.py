@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evaluation of designs: values that can be checked, and reasons where there are none."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Curves of friction and steps show the values they are given, beside what they are to meet."""
 
 from __future__ import annotations

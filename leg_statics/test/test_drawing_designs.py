@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of designs show where their means lie, and what a search found."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The picture of a leg shows its joints, workspace and forces in both views."""
 
 from __future__ import annotations

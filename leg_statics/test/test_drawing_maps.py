@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps show the values they are given, blank outside of the workspace, in one colour scale."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Efforts: power conservation, signs and utilisation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Footholds: verdicts, forces and shares, checked by other optimisers and by admissibility."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of forces, checked against the load capacity."""
 
 import numpy as np

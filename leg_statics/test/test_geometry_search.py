@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry search: the same designs always, whatever happens on the way."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Means on a grid against an independent foot-space grid and the paper's printed values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grounds: the published ranges, and files with mistakes."""
 
 from __future__ import annotations

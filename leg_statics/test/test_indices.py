@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indices against numpy's decompositions, brute force and the paper's statements."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint states to leg states: the same numbers as the functions of the library, one by one."""
 
 from __future__ import annotations

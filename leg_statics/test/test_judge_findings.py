@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What stands out is found whatever the number of messages, in bounded memory."""
 
 from collections import namedtuple

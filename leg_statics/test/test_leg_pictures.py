@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of a leg show what the library computes for it, in labels that can be read."""
 
 from __future__ import annotations

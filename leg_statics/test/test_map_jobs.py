@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps as jobs: memory, progress, cancellation; and what is best on a map."""
 
 import threading

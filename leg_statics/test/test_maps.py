@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Index maps: what they hold at a point is what the point itself gives."""
 
 from __future__ import annotations

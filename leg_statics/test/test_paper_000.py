@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's search on a part of its grid."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What paper 001 prints beside what `double_rhombus` gives."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What paper 004 states beside what `gantry_hybrid` gives, and the pictures of its example."""
 
 from __future__ import annotations

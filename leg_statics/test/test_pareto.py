@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Pareto front of a stream, against comparing every pair."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`force_transmission` against singular values and the closed form of the double rhombus leg."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `plot_index_map` writes pictures of a leg; a mistake ends with one line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How designs are drawn, on functions whose optimum is known."""
 
 import itertools

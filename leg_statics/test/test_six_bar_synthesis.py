@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's synthesis, what it states of its optimum, and the direct search."""
 
 from __future__ import annotations

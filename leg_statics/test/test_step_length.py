@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Step length against brute force, and the paper's finding about smooth ground."""
 
 from __future__ import annotations

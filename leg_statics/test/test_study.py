@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Study files: what they mean, and what is told about a wrong one."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Workers: order, bounds, and what the death of a process costs."""
 
 import itertools

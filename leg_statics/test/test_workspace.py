@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The workspace: what its grids, bounds, heights and sections hold is what the leg reaches."""
 
 from __future__ import annotations

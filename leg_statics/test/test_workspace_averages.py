@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Averages against fine grids and closed forms: the error that is stated is kept."""
 
 from __future__ import annotations

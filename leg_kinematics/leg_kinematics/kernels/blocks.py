@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks of points: what lets the compiler compute several points with one instruction.
 
 A kernel that runs over points copies them, a block at a time, into the rows of an array: row k

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where compiled kernels are kept: a folder that only this user can write, for it gets executed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scalar code of one point, compiled and broadcast over all leading axes of a batch.
 
 The mathematics of a point is written once, as scalar Python that reads like the paper:

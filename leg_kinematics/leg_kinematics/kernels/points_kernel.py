@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels that run over points by themselves and are called with any leading axes in their place.
 
     @points_kernel("(g),(points,3)->(points)", "f8 f8 f8")

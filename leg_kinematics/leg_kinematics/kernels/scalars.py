@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scalar functions that several mechanisms use in their kernels."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vectors of three numbers for use inside kernels.
 
 They are tuples, or rows of arrays, and no function has a branch: kernels take them in and compute

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The leg mechanisms, one file each, and the registry by which descriptions name them."""
 
 from __future__ import annotations

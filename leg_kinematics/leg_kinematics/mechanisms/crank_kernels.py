@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiled mathematics of planar legs driven by one crank, whatever bars follow the crank.
 
 `linkage_kernels` makes the kernels of a linkage from what is particular to it: its points and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What planar legs driven by one crank have in common, whatever bars follow the crank.
 
 The linkage is computed in its own plane and in crank lengths: crank axis A at the origin, X and Y

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`double_rhombus`: a serial-parallel leg driven by three cylinders (Wang, Jin, Li 2019).
 
 Two cylinders turn the two cranks of a planar five-bar at the hip O; the double rhombus OFGE, GHIJ

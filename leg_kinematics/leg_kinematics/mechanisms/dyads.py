@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Planar linkages by dyads (Assur groups): position, velocity and acceleration, point after point.
 
 A linkage of one crank is assembled as a textbook draws it. The crank's pin moves on a circle; two

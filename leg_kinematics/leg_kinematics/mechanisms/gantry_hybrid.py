@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`gantry_hybrid`: a 4-DOF hybrid manipulator with four slides (Yu, Chen, Ma, paper 004).
 
 A carriage E runs along Y and carries a parallel mechanism whose platform moves in X and Z and tilts

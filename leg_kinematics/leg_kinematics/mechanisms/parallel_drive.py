@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`parallel_drive`: the 2RUS+RU parallel-driving leg with a pantograph (Zhang, Jin, Zhang 2017).
 
 Three cranks with axes across the leg move a platform: two outer cranks through rods (2RUS) and

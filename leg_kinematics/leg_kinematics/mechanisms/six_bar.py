@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`six_bar`: a planar six-bar leg with one crank (paper 003).
 
 The crank is a ternary link A-B-E. Its pin B drives the rocker CD through the coupler BC, as in the

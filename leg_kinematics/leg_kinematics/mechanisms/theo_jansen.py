@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`theo_jansen`: Theo Jansen's eight-bar leg with one crank (the paradigm of paper 003).
 
 One crank AB drives two rockers on D: the lower one CD through the coupler BC, and the plate D-U-L

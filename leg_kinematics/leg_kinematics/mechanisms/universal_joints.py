@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A shaft that two universal joints and a sliding sleeve couple to a tilting platform.
 
 This is the auxiliary RUPUR chain F F1 F2 F3 F' of paper 004. The input shaft turns by theta about

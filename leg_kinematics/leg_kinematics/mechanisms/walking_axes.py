@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The axes in which paper 000 describes a leg, x to the right and y forward, and the leg frame.
 
 The leg frame follows REP-103: x forward, y left, z up. A mechanism whose equations keep the paper's

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entry points of nodes: light, so that Ctrl-C ends them quietly while they load."""
 
 from __future__ import annotations

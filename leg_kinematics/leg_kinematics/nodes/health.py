@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a node does and what goes wrong with it, counted for its diagnostics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kinematics node: foot and joint positions and Jacobians of the legs of one robot."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The log of a node: nothing floods it, and Python's own logging goes to it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node as a process: its executor, the thread that spins it, and the signals that end it."""
 
 from __future__ import annotations

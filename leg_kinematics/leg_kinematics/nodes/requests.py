@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the nodes share in reading requests: points, frames, and errors as codes of leg_msgs."""
 
 from __future__ import annotations

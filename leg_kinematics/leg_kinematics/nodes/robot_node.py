@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the nodes of a robot share: parameters, services, streams and diagnostics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A service, said once: for the node that serves it, and for whoever answers as the node does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The client for gait planners: numpy arrays in, named tuples out, exceptions for failures.
 
 A module for each family of questions says what is asked, what is answered, and how both travel.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The one path of every request of the client: wait for the server, send, answer or give up."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a robot's legs are: names, frames, joints, limits, geometry."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Searches for better dimensions of a leg."""
 
 from __future__ import annotations

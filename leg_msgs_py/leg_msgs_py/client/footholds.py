@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the leg can carry at candidate footholds."""
 
 from __future__ import annotations

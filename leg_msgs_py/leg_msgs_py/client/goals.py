@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The one path of every long piece of work: send the goal, hear its progress, end or cancel it."""
 
 from __future__ import annotations

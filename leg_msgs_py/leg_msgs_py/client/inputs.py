@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What callers give, as arrays and numbers of requests; and how many values come back for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the foot is, what the joints are, and the Jacobians between them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A client for gait planners: numpy arrays in, named tuples out, exceptions for failures.
 
     from leg_msgs_py.client import LegClient

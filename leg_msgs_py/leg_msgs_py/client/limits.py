@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The effort limits in force, and new ones."""
 
 from __future__ import annotations

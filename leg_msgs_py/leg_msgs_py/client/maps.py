@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Index maps: of a plane at once, of a whole workspace with progress."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a client can be asked, said once: `legs.ask(...)` waits, `legs.ask.future(...)` does not.
 
 A family of questions is a module of functions such as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far the next step may go."""
 
 from __future__ import annotations

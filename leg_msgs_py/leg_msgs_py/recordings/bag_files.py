@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The files of a recording: which they are, and what each of them holds, damaged or not."""
 
 from __future__ import annotations

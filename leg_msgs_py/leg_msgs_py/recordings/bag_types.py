@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The message types of a recording, as it defines them or as they are installed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A new recording, written without ROS."""
 
 from __future__ import annotations

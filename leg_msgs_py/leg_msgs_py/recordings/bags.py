@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rosbag2 recordings without ROS: mcap and sqlite3, split, compressed, damaged or without metadata.
 
     bag = Bag("walk")

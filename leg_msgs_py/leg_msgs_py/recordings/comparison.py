@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare messages with those expected, within tolerances, and tell readably where they differ.
 
     assert_same(outputs, expected, {"legs.load_capacity": Tolerance(relative=1e-9)})

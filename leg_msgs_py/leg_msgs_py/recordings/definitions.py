@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a message type is: its class, its full definition and its hash, as they are installed."""
 
 from __future__ import annotations

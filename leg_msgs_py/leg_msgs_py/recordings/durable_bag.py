@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording in the making: written by a thread of its own, in bounded memory, safe each second.
 
 It needs no ROS:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One exception for each way in which recordings can fail, below one root."""
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read an MCAP file from the front, without its index, as far as it is sound.
 
 A recorder that was killed, a full disk or a bad copy leave a file without its end, which readers

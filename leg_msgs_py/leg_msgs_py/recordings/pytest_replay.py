@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plug-in for pytest: the fixture `replay` plays recordings into live nodes.
 
 Name it in a `conftest.py` or in the module with the tests:

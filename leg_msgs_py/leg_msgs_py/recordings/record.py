@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command `record`: record topics into a rosbag2 recording, without rosbag2."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node that records topics as they are, without decoding them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Play recordings into live nodes and collect what they publish, to test gaits without a robot.
 
     from leg_msgs_py.recordings.comparison import Tolerance, assert_same

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When the next message of a recording is played: at its time, or as fast as it is answered."""
 
 from __future__ import annotations

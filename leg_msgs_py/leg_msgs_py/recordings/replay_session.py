@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One playing of a recording: connected before it begins, over when its outputs are in."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity with any number of joints, any limits and any friction: all candidates are tried.
 
 `problem` explains the problem; `three_joint_capacity` solves the common case quickly.

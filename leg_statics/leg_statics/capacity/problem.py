@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity: the largest force the ground may exert on a foot within the limits of its leg.
 
 What loads a leg. Without load the actuators exert the efforts that the pose needs anyway: the bias,

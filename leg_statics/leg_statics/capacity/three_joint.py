@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load capacity of a leg with three actuators whose limits admit the unloaded pose, quickly.
 
 That is the common case; `problem` explains the problem and handles all others. There is no branch

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of a leg: each computes what it shows, then draws it.
 
 Every function returns a figure, drawn into `figure` if one is given, such as `plt.figure()`.

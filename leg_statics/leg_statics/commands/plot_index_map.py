@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command that draws a leg's index maps, friction, step lengths, load capacity and linkage."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command `search_geometry`: find better dimensions of a leg, as a study file tells."""
 
 from __future__ import annotations

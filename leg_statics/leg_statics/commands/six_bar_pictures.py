@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of six-bar legs beside Theo Jansen's: each is computed, then drawn."""
 
 from __future__ import annotations

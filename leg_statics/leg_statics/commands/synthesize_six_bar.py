@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command `synthesize_six_bar`: find a six-bar leg that follows Theo Jansen's and draw it.
 
 Draws figures 2, 5, 7, 8, 9 and 12 of paper 003. Lengths are in cranks, or in mm with

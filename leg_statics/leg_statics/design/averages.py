@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Averages over the workspace, refined until their error is as small as asked.
 
 The integrands are smooth, but the poses that a leg can take end abruptly inside of the actuator

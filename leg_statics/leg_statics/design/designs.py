@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a geometry is worth: global means, workspace, step and load capacity of a changed mechanism.
 
 A design is a mechanism with some of its dimensions changed. What is wanted of it is named by

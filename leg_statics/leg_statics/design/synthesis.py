@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dimensions of the six-bar leg whose foot follows Theo Jansen's (paper 003, sections 3 and 4).
 
 Both legs share the crank, coupler BC, rocker CD and foot bar CG, so their feet agree where the foot

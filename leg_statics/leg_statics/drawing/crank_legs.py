@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of legs that one crank drives beside Theo Jansen's, as paper 003 draws them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of designs: their means over the workspace, and what a search among them found."""
 
 from __future__ import annotations

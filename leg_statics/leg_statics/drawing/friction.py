@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Picture of the rated friction along the walking direction, beside that of grounds."""
 
 from __future__ import annotations

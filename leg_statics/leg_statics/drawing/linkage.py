@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Picture of a leg from the side and from the front, in its workspace, with forces at its foot."""
 
 from __future__ import annotations

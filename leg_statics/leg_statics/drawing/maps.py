@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of index maps: small multiples in one colour scale."""
 
 from __future__ import annotations

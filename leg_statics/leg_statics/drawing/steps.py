@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Picture of the longest step against the height of the leg frame over the ground."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the pictures look: sizes, fonts, line styles, labels from the index registry, files.
 
 Every picture is a `Figure` made for print at 100 mm width. Functions draw into the one they are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the nodes share in reading requests about grounds: friction, normal, loads and moments."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The designs node: geometry searches as an action.
 
 It is no part of a walking robot's nodes: a search takes all the processor cores it is given.

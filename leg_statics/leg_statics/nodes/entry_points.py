@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entry points of the nodes about statics: light, see `leg_kinematics.nodes.entry_points`."""
 
 from functools import partial

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Goals of an action that are worked off in order, in a thread that knows nothing of ROS.
 
 The executor of a node has one thread, and a coroutine that waits would keep it busy. So goals wait

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What services ask of the node that answers them, or of whoever answers as it does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The maps node: index maps of the legs of one robot, and markers that show the legs.
 
 It is a process of its own, so that a map never delays the answer to a query.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What RViz and Foxglove show of a leg: linkage, foot, forces, and a slice of its workspace."""
 
 from __future__ import annotations

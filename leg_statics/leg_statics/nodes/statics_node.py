@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The statics node: what the legs of one robot can carry, asked by services and as a stream."""
 
 from __future__ import annotations

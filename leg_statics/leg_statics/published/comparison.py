@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One published number or claim beside ours, with the verdict computed, never typed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Means of indices as paper 000 computes them, on one regular grid: equations (4), (29), (32).
 
     mean = sum(index |det J|) / sum(|det J|)        over the poses of a grid that are OK

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Zhang, Jin, Zhang 2017: the parallel-driving leg (doi 10.11975/j.issn.1002-6819.2017.21.007)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wang, Jin, Li 2019: the leg that `double_rhombus` models (article 1000-1298(2019)01-0383-07).
 
 The constants printed in the paper do not reproduce its Table 1, whatever the angle varphi = AOF is,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wang, Liu, Huang: the six-bar leg that follows Theo Jansen's (`six_bar`, `theo_jansen`).
 
 The copy at hand has no tables, so their dimensions cannot be compared: only what the text prints.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Yu, Chen, Ma: kinematics and simulation of a 4-DOF hybrid manipulator (received August 2006).
 
 The paper prints its dimensions and a motion of 5 s, and shows the results as curves only: figure 4

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a recording tells about the legs: the node's own answers, many messages at once.
 
 Joint states go through `JointStream`, as in the statics node. Beside its states, the judge works

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Diagnostics in a recording, told in a few lines whatever their number."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What stands out in a judged recording, gathered in constant memory while it is read.
 
 For every leg: how far each quantity goes and how often beyond its limit, the worst moments, and

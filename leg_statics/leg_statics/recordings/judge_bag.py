@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command `judge_bag`: what a recording tells about the legs, without ROS running.
 
 Every joint state and every planner's query of a rosbag2 recording (folder or file; mcap or sqlite3;

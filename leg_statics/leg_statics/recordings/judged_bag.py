@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A copy of a recording with the leg states that the statics node would have published."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Queries of planners in a recording, answered again by the services that the nodes answer with.
 
 A node whose parameter `service_events` is "contents" publishes its requests and responses. Every

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a judged recording: Markdown with pictures beside it, or one HTML file.
 
 HTML is made from the same Markdown, with the pictures inside.

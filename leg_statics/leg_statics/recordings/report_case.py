@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All that is told of a judged recording."""
 
 from __future__ import annotations

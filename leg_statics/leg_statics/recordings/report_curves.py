@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The curves of a judged recording over time: of a leg, and of the queries of a service."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a judged recording in words and tables: Markdown."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables of a judged recording, as Parquet or CSV.
 
 One has a row for each leg at each joint state, the other a row for each query of a planner.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the kinematics node answers, by families of questions as in `leg_msgs_py.client`."""
 
 from leg_kinematics.nodes.services import kinematics

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Foot positions of joints, joints of foot positions, and the Jacobians between them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A table of designs on disk that only grows: a CSV file that survives whatever ends the program.
 
 A line is written in one go as soon as a design is evaluated. The last line may be torn by a kill or

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry search: work a study off on many processes, and go on where it stopped.
 
 The results are a table that only grows: its line i is the i-th design that the method drew. What a

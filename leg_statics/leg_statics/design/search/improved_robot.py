@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A robot's description with other dimensions for its legs of one mechanism."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry searches as jobs in a thread, with progress and cancellation."""
 
 from __future__ import annotations

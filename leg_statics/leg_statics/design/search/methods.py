@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a geometry search draws its designs: a grid, samples, or an optimiser.
 
 Every method works in the unit cube, one axis a parameter, and has its points evaluated by a

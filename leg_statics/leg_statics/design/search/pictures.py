@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pictures that the outcome of a geometry search gives."""
 
 from __future__ import annotations

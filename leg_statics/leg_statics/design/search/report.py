@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a geometry search leaves besides its table: the winner as a robot, and a report."""
 
 from __future__ import annotations

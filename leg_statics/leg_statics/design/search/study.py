@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Studies: what a geometry search varies, wants and may spend."""
 
 from __future__ import annotations

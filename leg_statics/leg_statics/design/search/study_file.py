@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Study files: what a geometry search varies, wants and may spend, as checked YAML.
 
 A file has this form (lengths and angles in the units it states, all else in SI):

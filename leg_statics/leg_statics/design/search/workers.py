@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Worker processes: on the processor cores of this machine, or of a Dask cluster.
 
 Both do the same: work through items, a bounded number at a time, and give the results in the order

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a leg is: names, frames, joints, limits, geometry."""
 
 from __future__ import annotations

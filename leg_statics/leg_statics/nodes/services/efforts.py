@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The joint efforts that hold ground reactions."""
 
 from __future__ import annotations

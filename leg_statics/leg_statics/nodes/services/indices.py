@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Performance indices at foot positions."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The longest steps: one leg in its own frame, or several that step together on a body."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 2 and 5 to 8 of paper 000: its leg before and after the optimisation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 3 and 4 of paper 001: maps of K_F and K_J, beside all others of the leg."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 2, 5, 7, 8, 9 and 12 of paper 003: the six-bar leg beside Theo Jansen's, in cranks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 4 and 5 of paper 004: the drives and the output shaft in its example of 5 s."""
 
 from __future__ import annotations
