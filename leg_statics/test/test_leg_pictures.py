@@ -36,7 +36,7 @@ def test_an_index_is_mapped_at_the_heights_asked_for_from_the_lowest():
     assert [ax.get_title() for ax in panels(figure)] == ["$h$ = −0.80 m", "$h$ = −0.70 m"]
     truth = plane_map(LEG, -0.80, RESOLUTION, layers=["condition_number"])
     shown = np.ma.masked_invalid(meshes(figure)[0].get_array()).compressed()
-    wanted = truth.values[0, ..., 0].T
+    wanted = truth.values[..., 0].T
     np.testing.assert_array_equal(shown, wanted[np.isfinite(wanted)])
 
 

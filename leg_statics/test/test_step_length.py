@@ -135,7 +135,7 @@ def test_the_common_step_is_the_shortest():
     common = common_step(robot.legs, heights, contact, lateral_offset=0.05)
     lengths = np.array([step.length for step in common.steps.values()])
     assert list(common.steps) == list(robot.legs)
-    np.testing.assert_array_equal(common.length, lengths.min(axis=0))
+    np.testing.assert_array_equal(common.common_length, lengths.min(axis=0))
     # lateral offset counts to the left of the direction: inward for a leg, outward for its mirror
     left, right = common.steps["left_front"], common.steps["right_front"]
     mirror = common_step(

@@ -25,7 +25,7 @@ def get_index_map(host: MapsHost, request: Any, response: Any) -> None:
     leg = host.robot.leg(request.leg)
     plane = host.plane(leg, map_key(host, leg, request, LegFrame(), request.height))
     response.header.frame_id = leg.frame
-    response.ny, response.nx = plane.status.shape[1:]
+    response.ny, response.nx = plane.status.shape
     response.x0, response.y0 = float(plane.x[0]), float(plane.y[0])
     response.height, response.resolution = request.height, request.resolution
     response.layers = list(plane.layers)
