@@ -163,7 +163,7 @@ def find_robot_file(source: str | os.PathLike[str]) -> Path:
         DescriptionError: If there is no such file; the message lists the shipped robots.
     """
     path = user_path(source)
-    if path.suffix in (".yaml", ".yml") or exists(path):
+    if path.name and (path.suffix in (".yaml", ".yml") or exists(path)):
         return existing_path("robot description", path)
     shipped = shared_files("leg_bringup", "robots", ".yaml")
     if str(source) not in shipped:

@@ -58,7 +58,7 @@ def empty_answer(count):
     response.error.code = ErrorCode.SUCCESS
     for field, kind in response.get_fields_and_field_types().items():
         if kind.startswith("sequence<") and field not in ("ranking", "joint_names"):
-            values = [0] * (count if field not in ("joint_efforts", "forces") else 0)
+            values = [0] * (count if field not in ("joint_efforts", "force") else 0)
             setattr(response, field, values)
     return response
 
