@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from leg_kinematics.conditioning import condition_number
 from leg_kinematics.robot import Robot
+
+FAR = 1e5  # joint positions that no leg has: only the thorough way of a mechanism takes them
 
 
 def warm_up_kinematics(robot: Robot) -> None:
@@ -16,3 +20,4 @@ def warm_up_kinematics(robot: Robot) -> None:
         mechanism.angular_jacobian(posture)
         mechanism.passive_joint_positions(posture)
         mechanism.inverse_with_twist(foot)
+        mechanism.forward(np.full(len(mechanism.joints), FAR))

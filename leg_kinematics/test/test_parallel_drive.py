@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from leg_kinematics import GeometryError, ParallelDrive, Status
+from leg_kinematics.kernels.settled import UNCERTAIN
+from leg_kinematics.mechanisms.parallel_drive import _forward, _forward_search
 from leg_kinematics.mechanisms.walking_axes import walking_vectors
 from leg_kinematics.mirrored import Mirrored
 
@@ -96,6 +98,19 @@ def test_forward_never_leaves_the_branch_of_the_initial_pose():
     halved = np.abs(np.diff(path.closure[::2][:, inside], axis=0))
     # a smooth path halves its steps with the sampling; a jump would keep its size
     assert np.all(velocity.max(axis=0) < 0.8 * halved.max(axis=0) + 1e-6)
+
+
+@pytest.mark.parametrize(("reach", "most"), [(0.36, 0.9), (1.0, 0.2)])
+def test_steps_of_a_block_find_what_a_search_for_each_point_finds(reach, most):
+    q = np.random.default_rng(4).uniform(-reach, reach, (4000, 3))
+    for mode in reversed(INITIAL.assembly_modes):  # the initial one last
+        parameters = INITIAL._parameters(mode)
+        coordinates, status = _forward(parameters, q)
+        sure = status != UNCERTAIN
+        searched, expected = _forward_search(parameters, q[sure])
+        np.testing.assert_array_equal(status[sure], expected)
+        np.testing.assert_allclose(coordinates[sure], searched, rtol=0.0, atol=1e-12)
+    assert np.mean(sure) > most
 
 
 @legs

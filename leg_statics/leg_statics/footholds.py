@@ -16,6 +16,7 @@ from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_numbers, put, store
 from leg_kinematics.kernels.kernel import inlined
 from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.settled import UNCERTAIN, settled
 from leg_kinematics.kernels.vectors import inner, unit
 from leg_kinematics.mechanism import Posture
 from leg_kinematics.robot import Leg
@@ -38,7 +39,6 @@ from leg_statics.capacity.problem import (
     OUTCOME,
     RESERVE,
     ROUGH,
-    UNCERTAIN,
     UPPER,
     WANTED,
     J,
@@ -47,7 +47,6 @@ from leg_statics.capacity.problem import (
     leave_room,
     new_block,
     row_of,
-    settled,
     solve_any,
     solve_three,
 )

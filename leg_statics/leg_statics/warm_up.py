@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from leg_kinematics.robot import Leg, Robot
+from leg_kinematics.warm_up import FAR
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.footholds import Contact, evaluate_footholds
@@ -30,4 +31,6 @@ def warm_up_statics(robot: Robot) -> None:
             utilisation(leg.effort_limits[:, 0], leg.effort_limits)
     joints = [leg.mechanism.initial_posture.joint_positions for leg in robot.legs.values()]
     names, _ = robot.effort_limits()
-    JointStream(robot, friction=0.4).read(names, np.concatenate(joints))
+    stream = JointStream(robot, friction=0.4)
+    for positions in (np.concatenate(joints), np.full(len(names), FAR)):
+        stream.read(names, positions)

@@ -24,23 +24,24 @@ Frame {P} has its origin at the middle of the outer crank axes, {C} at the hip H
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar, NamedTuple
+from functools import cached_property, partial
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
+from leg_kinematics.arrays import FloatArray, as_array, has_code, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.kernels.kernel import inlined, kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.kernels.scalars import arctan2, included_angle, swing_plane, within, wrapped
+from leg_kinematics.kernels.scalars import LARGEST_ANGLE, arctan2, cosine_sine, within, wrapped
+from leg_kinematics.kernels.settled import UNCERTAIN, settled
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.walking_axes import in_leg_frame, in_walking_axes, leg_vectors
 from leg_kinematics.status import Status
@@ -51,10 +52,12 @@ LIMITS_SIZE = 24  # lower and upper limits of 3 cranks and 9 passive joints
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
 
 NEWTON_STEPS = 20
+BLOCK_STEPS = 5  # of a block of points; within the default ranges rounding is left after them
 NEWTON_TOLERANCE = 1e-14  # [rad]
 
 
 Numbers = Sequence[float]  # a tuple in compiled code
+Cranks = tuple[float, float, float, float, float, float]  # (cos, sin) of phi_1, phi_2, phi_3
 
 
 class Geometry(NamedTuple):
@@ -216,61 +219,96 @@ def gradients(g: Geometry, p: Pose) -> tuple[Gradient, Gradient]:
 
 
 @scalar
-def cosine_sine(angle: float) -> tuple[float, float]:
-    """Return (cos, sin)."""
+def direction(angle: float) -> tuple[float, float]:
+    """Return (cos, sin) of the library."""
     return math.cos(angle), math.sin(angle)
+
+
+@inlined
+def turned(direction: tuple[float, float], angle: float) -> tuple[float, float]:
+    """Return a direction (cos, sin) turned by 2 atan(angle / 2): by the angle, if that is small."""
+    t = 0.5 * angle
+    per_square = 1.0 / (1.0 + t * t)
+    c, s = (1.0 - t * t) * per_square, 2.0 * t * per_square
+    return direction[0] * c - direction[1] * s, direction[1] * c + direction[0] * s
+
+
+@inlined
+def pose_of_directions(
+    g: Geometry,
+    cranks: Cranks,
+    a: tuple[float, float],
+    b: tuple[float, float],
+    pantograph: tuple[float, float, float, float, float, float],
+) -> Pose:
+    """Return the pose of known angles, given by (cos, sin) of each."""
+    x1, y1, z1 = rod(g, 1.0, cranks[0:2], cranks[4:6], a, b)
+    x2, y2, z2 = rod(g, -1.0, cranks[2:4], cranks[4:6], a, b)
+    return Pose(*pantograph, *a, *b, *cranks, x1, y1, z1, x2, y2, z2)
 
 
 @scalar
 def pose_of_angles(g: Geometry, q: FloatArray, closure: FloatArray) -> Pose:
     """Return the pose of known crank angles and closure."""
-    crank_1, crank_2 = cosine_sine(g.phi1 + q[0]), cosine_sine(g.phi1 + q[1])
-    center, a, b = cosine_sine(g.phi3 + q[2]), cosine_sine(closure[0]), cosine_sine(closure[1])
-    c1, s1 = cosine_sine(closure[2])
-    c2, s2 = cosine_sine(closure[3])
-    c3, s3 = cosine_sine(closure[4])
-    x1, y1, z1 = rod(g, 1.0, crank_1, center, a, b)
-    x2, y2, z2 = rod(g, -1.0, crank_2, center, a, b)
-    return Pose(
-        *(c1, s1, c2, s2, c3, s3),
-        *(a[0], a[1], b[0], b[1]),
-        *(crank_1[0], crank_1[1], crank_2[0], crank_2[1], center[0], center[1]),
-        *(x1, y1, z1, x2, y2, z2),
+    return pose_of_directions(
+        g,
+        (*direction(g.phi1 + q[0]), *direction(g.phi1 + q[1]), *direction(g.phi3 + q[2])),
+        direction(closure[0]),
+        direction(closure[1]),
+        (*direction(closure[2]), *direction(closure[3]), *direction(closure[4])),
+    )
+
+
+@inlined
+def symmetric_elevation(
+    g: Geometry, crank: tuple[float, float], center: tuple[float, float]
+) -> tuple[float, float]:
+    """Return (cos, sin) of the a that closes the loops if both outer cranks stand alike (b = 0).
+
+    It follows from the triangle U3 G, and U3 and G to the middle of U1 U2; NaN if that is open.
+    """
+    y, z = center_pin(g, *center)
+    y, z = g.m1 * crank[0] - y, g.m1 * crank[1] - z
+    arm = 0.5 * g.d - g.a
+    square = y * y + z * z
+    base = math.sqrt(square)
+    cosine = (g.l3 * g.l3 + square - (g.l1 * g.l1 - arm * arm)) / (2.0 * g.l3 * base)
+    sine = math.sqrt(1.0 - cosine * cosine)
+    return (y * cosine + z * sine) / base, (z * cosine - y * sine) / base
+
+
+@inlined
+def platform_step(
+    g: Geometry, cranks: Cranks, a: tuple[float, float], b: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Return the step of Newton's method to (a, b) that close the rods, and |f_1| + |f_2|.
+
+    All angles are given by (cos, sin).
+    """
+    crank_1, crank_2, center = cranks[0:2], cranks[2:4], cranks[4:6]
+    r1 = rod(g, 1.0, crank_1, center, a, b)
+    r2 = rod(g, -1.0, crank_2, center, a, b)
+    d1 = rod_gradient(g, 1.0, crank_1, center, a, b, r1)
+    d2 = rod_gradient(g, -1.0, crank_2, center, a, b, r2)
+    f1 = 0.5 * (r1[0] * r1[0] + r1[1] * r1[1] + r1[2] * r1[2] - g.l1 * g.l1)
+    f2 = 0.5 * (r2[0] * r2[0] + r2[1] * r2[1] + r2[2] * r2[2] - g.l1 * g.l1)
+    determinant = d1.a * d2.b - d1.b * d2.a
+    return (
+        (f2 * d1.b - f1 * d2.b) / determinant,
+        (f1 * d2.a - f2 * d1.a) / determinant,
+        abs(f1) + abs(f2),
     )
 
 
 @scalar
-def elevation_guess(g: Geometry, q: float, q3: float) -> float:
-    """Return the angle a that closes the loops when both outer cranks stand at q (then b = 0)."""
-    y, z = center_pin(g, *cosine_sine(g.phi3 + q3))
-    y = g.m1 * math.cos(g.phi1 + q) - y
-    z = g.m1 * math.sin(g.phi1 + q) - z
-    reach = math.sqrt(g.l1 * g.l1 - (0.5 * g.d - g.a) ** 2)
-    return math.atan2(z, y) - included_angle(g.l3, math.hypot(y, z), reach)
-
-
-@scalar
-def newton(
-    g: Geometry, q1: float, q2: float, q3: float, a: float, b: float
-) -> tuple[bool, float, float]:
+def newton(g: Geometry, cranks: Cranks, a: float, b: float) -> tuple[bool, float, float]:
     """Solve the two rod equations for (a, b) from a starting point; True if converged."""
-    crank_1, crank_2 = cosine_sine(g.phi1 + q1), cosine_sine(g.phi1 + q2)
-    center = cosine_sine(g.phi3 + q3)
     for _ in range(NEWTON_STEPS):
-        a_pair, b_pair = cosine_sine(a), cosine_sine(b)
-        r1 = rod(g, 1.0, crank_1, center, a_pair, b_pair)
-        r2 = rod(g, -1.0, crank_2, center, a_pair, b_pair)
-        d1 = rod_gradient(g, 1.0, crank_1, center, a_pair, b_pair, r1)
-        d2 = rod_gradient(g, -1.0, crank_2, center, a_pair, b_pair, r2)
-        f1 = 0.5 * (r1[0] * r1[0] + r1[1] * r1[1] + r1[2] * r1[2] - g.l1 * g.l1)
-        f2 = 0.5 * (r2[0] * r2[0] + r2[1] * r2[1] + r2[2] * r2[2] - g.l1 * g.l1)
-        determinant = d1.a * d2.b - d1.b * d2.a
-        step_a = (f1 * d2.b - f2 * d1.b) / determinant
-        step_b = (f2 * d1.a - f1 * d2.a) / determinant
-        a -= step_a
-        b -= step_b
+        step_a, step_b, residual = platform_step(g, cranks, direction(a), direction(b))
+        a += step_a
+        b += step_b
         # near the singularity rounding of f keeps the steps from shrinking further
-        rounding = 1e-8 if abs(f1) + abs(f2) < 1e-20 else 0.0
+        rounding = 1e-8 if residual < 1e-20 else 0.0
         if abs(step_a) + abs(step_b) < NEWTON_TOLERANCE + rounding:
             return True, wrapped(a), wrapped(b)
     return False, a, b
@@ -314,7 +352,9 @@ def walking_on_branch(g: Geometry, branch: Branch, p: Pose) -> bool:
 
 
 @scalar
-def solve_platform(g: Geometry, branch: Branch, q: FloatArray) -> tuple[bool, bool, float, float]:
+def solve_platform(
+    g: Geometry, branch: Branch, cranks: Cranks, symmetric: tuple[float, float]
+) -> tuple[int, float, float]:
     """Find the platform pose (a, b) of a branch for given cranks.
 
     The rod equations have up to four real solutions with b in ±90°. Newton's method from the
@@ -322,22 +362,28 @@ def solve_platform(g: Geometry, branch: Branch, q: FloatArray) -> tuple[bool, bo
     branch, otherwise further starting points are tried.
 
     Returns:
-        Whether the pose was found, whether the rods close in any way, a and b.
+        OK, or why there is none: SINGULAR if the rods close in another way, else UNREACHABLE; a
+        and b.
     """
-    q1, q2, q3 = q[0], q[1], q[2]
-    closure = np.zeros(5)
-    closes, a, b = newton(g, q1, q2, q3, elevation_guess(g, 0.5 * (q1 + q2), q3), 0.0)
-    closure[0], closure[1] = a, b
-    if closes and drive_on_branch(g, branch, pose_of_angles(g, q, closure)):
-        return True, True, a, b
-    for i in range(16):
-        for j in range(3):
-            converged, a, b = newton(g, q1, q2, q3, i * math.pi / 8.0, 0.5 * (j - 1))
-            closes = closes or converged
-            closure[0], closure[1] = a, b
-            if converged and drive_on_branch(g, branch, pose_of_angles(g, q, closure)):
-                return True, True, a, b
-    return False, closes, math.nan, math.nan
+    status = UNREACHABLE
+    for start in range(-1, 48):
+        if start < 0:
+            closes, a, b = newton(g, cranks, math.atan2(symmetric[1], symmetric[0]), 0.0)
+        else:
+            closes, a, b = newton(g, cranks, start // 3 * math.pi / 8.0, 0.5 * (start % 3 - 1))
+        if closes and platform_on_branch(g, branch, cranks, direction(a), direction(b)):
+            return OK, a, b
+        status = SINGULAR if closes else status
+    return status, math.nan, math.nan
+
+
+@inlined
+def platform_on_branch(
+    g: Geometry, branch: Branch, cranks: Cranks, a: tuple[float, float], b: tuple[float, float]
+) -> bool:
+    """Tell whether the drive lies on the branch, whatever the pantograph does."""
+    unknown = (math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+    return drive_on_branch(g, branch, pose_of_directions(g, cranks, a, b, unknown))
 
 
 @inlined
@@ -415,28 +461,32 @@ def closure_angles(p: Pose) -> tuple[float, float, float, float, float]:
     )
 
 
-@scalar
+@inlined
 def pantograph_of_drive(
-    g: Geometry, knee: float, q3: float, a: float, b: float
-) -> tuple[float, float, float]:
-    """Return th1, th2, th3 of the pantograph that the platform pose (a, b) drives."""
-    y, z = center_pin(g, *cosine_sine(g.phi3 + q3))
-    sx = g.l3 * math.sin(b)
-    sy = y + g.l3 * math.cos(b) * math.cos(a) - g.l33 * math.sin(a)
-    sz = z + g.l3 * math.cos(b) * math.sin(a) + g.l33 * math.cos(a)
-    th3, s_zeta = swing_plane(sx, sz + g.lz)
-    lever, lever_angle = math.hypot(g.c, g.lg), math.atan2(g.lg, g.c)
-    c1, s1, c, s = two_link(sy - g.ly, s_zeta, g.l4, lever, knee)
-    return math.atan2(s1, c1), wrapped(math.atan2(s, c) - lever_angle), th3
+    g: Geometry,
+    knee: float,
+    center: tuple[float, float],
+    a: tuple[float, float],
+    b: tuple[float, float],
+) -> tuple[float, float, float, float, float, float]:
+    """Return (cos, sin) of th1, th2, th3 of the pantograph that the platform drives, or NaN."""
+    y, z = center_pin(g, *center)
+    sx = g.l3 * b[1]
+    sy = y + g.l3 * b[0] * a[0] - g.l33 * a[1] - g.ly
+    sz = z + g.l3 * b[0] * a[1] + g.l33 * a[0] + g.lz
+    radius = math.sqrt(sx * sx + sz * sz)
+    lever = math.sqrt(g.c * g.c + g.lg * g.lg)
+    c1, s1, c, s = two_link(sy, -radius, g.l4, lever, knee)
+    c2, s2 = (g.c * c + g.lg * s) / lever, (g.c * s - g.lg * c) / lever
+    return c1, s1, c2, s2, -sz / radius, -sx / radius
 
 
-@scalar
-def foot_point(g: Geometry, th1: float, th2: float, th3: float) -> tuple[float, float, float]:
+@inlined
+def foot_of_pose(g: Geometry, p: Pose) -> tuple[float, float, float]:
     """Return the foot C in {C}."""
     upper = g.l4 + g.l5 + g.l7
-    zeta = upper * math.sin(th1) + g.l6 * math.sin(th2)
-    y = upper * math.cos(th1) + g.l6 * math.cos(th2)
-    return zeta * math.sin(th3), y, zeta * math.cos(th3)
+    zeta = upper * p.s1 + g.l6 * p.s2
+    return zeta * p.s3, upper * p.c1 + g.l6 * p.c2, zeta * p.c3
 
 
 @inlined
@@ -576,10 +626,13 @@ def jacobian_columns(
 
 # --------------------------------------------------------------------------- kernels
 
-# The inverse runs over blocks of points, with these rows:
-X, Q, CLOSURE, STATUS, J, OMEGA, ROWS = 0, 3, 6, 11, 12, 21, 30
-# An array of results costs a call as much as several points do. Joint positions and closure, whose
-# rows follow each other, therefore share one, as do both Jacobians.
+# Kernels run over blocks of points, with these rows: what is given, foot or cranks, and what is
+# found, cranks or foot and below them the closure;
+GIVEN, FOUND, CLOSURE, STATUS, J, OMEGA = 0, 3, 6, 11, 12, 21
+# and, of known cranks, (cos, sin) of them and of a and b, and whether those are found.
+CRANKS, PLATFORM, OUTCOME, ROWS = 30, 36, 40, 41
+# An array of results costs a call as much as several points do. What is found therefore shares one,
+# as do both Jacobians.
 
 
 @inlined
@@ -587,7 +640,7 @@ def solve_foot(
     g: Geometry, branch: Branch, rest: Numbers, limits: Numbers, block: FloatArray, i: int
 ) -> Pose:
     """Solve point i of a block: fill crank angles, closure and status, return the pose."""
-    x, y, z = in_walking_axes(*get3(block, X, i))
+    x, y, z = in_walking_axes(*get3(block, GIVEN, i))
     pose = pose_of_foot(g, branch, x, y, z)
     q = crank_angles(g, pose)
     status = status_of_pose(g, branch, rest, limits, q, pose)
@@ -597,10 +650,27 @@ def solve_foot(
     block[STATUS, i] = status
     closure = closure_angles(pose)
     for k in range(3):
-        block[Q + k, i] = q[k] * known
+        block[FOUND + k, i] = q[k] * known
     for k in range(5):
         block[CLOSURE + k, i] = closure[k] * known
     return pose
+
+
+@inlined
+def put_twist(g: Geometry, p: Pose, block: FloatArray, i: int) -> None:
+    """Fill both Jacobians of point i of a block."""
+    f1, f2 = gradients(g, p)
+    for crank in range(3):
+        v, omega = jacobian_columns(g, p, f1, f2, crank)
+        put(block, J + 3 * crank, i, v)
+        put(block, OMEGA + 3 * crank, i, omega)
+
+
+@inlined
+def store_twist(block: FloatArray, twist: FloatArray, start: int, end: int) -> None:
+    """Copy both Jacobians of a block below each other."""
+    store_columns(block, J, twist[:, :3], start, end, 3)
+    store_columns(block, OMEGA, twist[:, 3:], start, end, 3)
 
 
 @inlined
@@ -622,10 +692,10 @@ def _inverse(parameters, foot, coordinates, status):
     block = np.empty((ROWS, BLOCK))
     for start in range(0, len(foot), BLOCK):
         end = min(start + BLOCK, len(foot))
-        load(block, X, foot, start, end, 3)
+        load(block, GIVEN, foot, start, end, 3)
         for i in range(end - start):
             solve_foot(g, branch, rest, limits, block, i)
-        store(block, Q, coordinates, start, end, 8)
+        store(block, FOUND, coordinates, start, end, 8)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
 
@@ -637,46 +707,141 @@ def _inverse_with_twist(parameters, foot, coordinates, status, twist):
     block = np.empty((ROWS, BLOCK))
     for start in range(0, len(foot), BLOCK):
         end = min(start + BLOCK, len(foot))
-        load(block, X, foot, start, end, 3)
+        load(block, GIVEN, foot, start, end, 3)
         for i in range(end - start):
-            pose = solve_foot(g, branch, rest, limits, block, i)
-            f1, f2 = gradients(g, pose)
-            for crank in range(3):
-                v, omega = jacobian_columns(g, pose, f1, f2, crank)
-                put(block, J + 3 * crank, i, v)
-                put(block, OMEGA + 3 * crank, i, omega)
-        store(block, Q, coordinates, start, end, 8)
-        store_columns(block, J, twist[:, :3], start, end, 3)
-        store_columns(block, OMEGA, twist[:, 3:], start, end, 3)
+            put_twist(g, solve_foot(g, branch, rest, limits, block, i), block, i)
+        store(block, FOUND, coordinates, start, end, 8)
+        store_twist(block, twist, start, end)
         for i in range(end - start):
             status[start + i] = int(block[STATUS, i])
 
 
-@scalar
+@inlined
+def load_cranks(g: Geometry, block: FloatArray, i: int) -> None:
+    """Fill (cos, sin) of the cranks of point i of a block, and those of the symmetric pose."""
+    q1, q2, q3 = get3(block, GIVEN, i)
+    center = cosine_sine(g.phi3 + q3)
+    put(block, CRANKS, i, (*cosine_sine(g.phi1 + q1), *cosine_sine(g.phi1 + q2), *center))
+    symmetric = symmetric_elevation(g, cosine_sine(g.phi1 + 0.5 * (q1 + q2)), center)
+    put(block, PLATFORM, i, (*symmetric, 1.0, 0.0))
+
+
+@inlined
+def cranks_of(block: FloatArray, i: int) -> Cranks:
+    """Return (cos, sin) of the cranks of point i."""
+    return (*get3(block, CRANKS, i), *get3(block, CRANKS + 3, i))
+
+
+@inlined
+def platform_of(block: FloatArray, i: int) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return (cos, sin) of a and b of point i."""
+    a = block[PLATFORM, i], block[PLATFORM + 1, i]
+    return a, (block[PLATFORM + 2, i], block[PLATFORM + 3, i])
+
+
+@inlined
+def find_platforms(g: Geometry, branch: Branch, block: FloatArray, count: int) -> None:
+    """Find the platform poses of a block by some steps from the symmetric pose.
+
+    They suffice within the default ranges; UNCERTAIN is what remains open.
+    """
+    for i in range(count):
+        load_cranks(g, block, i)
+    for _ in range(BLOCK_STEPS):
+        for i in range(count):
+            a, b = platform_of(block, i)
+            step_a, step_b, _ = platform_step(g, cranks_of(block, i), a, b)
+            put(block, PLATFORM, i, (*turned(a, step_a), *turned(b, step_b)))
+    for i in range(count):
+        a, b = platform_of(block, i)
+        step_a, step_b, _ = platform_step(g, cranks_of(block, i), a, b)
+        q1, q2, q3 = get3(block, GIVEN, i)
+        found = platform_on_branch(g, branch, cranks_of(block, i), a, b)
+        found &= abs(step_a) + abs(step_b) < NEWTON_TOLERANCE
+        found &= abs(q1) + abs(q2) + abs(q3) < LARGEST_ANGLE
+        outcome = OK if found else UNCERTAIN
+        block[OUTCOME, i] = outcome if math.isfinite(q1 + q2 + q3) else INVALID_INPUT
+
+
+@inlined
+def search_platforms(g: Geometry, branch: Branch, block: FloatArray, count: int) -> None:
+    """Find the platform poses of a block one by one, wherever they are."""
+    for i in range(count):
+        q1, q2, q3 = get3(block, GIVEN, i)
+        crank_1, crank_2 = direction(g.phi1 + q1), direction(g.phi1 + q2)
+        center, middle = direction(g.phi3 + q3), direction(g.phi1 + 0.5 * (q1 + q2))
+        put(block, CRANKS, i, (*crank_1, *crank_2, *center))
+        symmetric = symmetric_elevation(g, middle, center)
+        block[OUTCOME, i], a, b = solve_platform(g, branch, cranks_of(block, i), symmetric)
+        put(block, PLATFORM, i, (*direction(a), *direction(b)))
+
+
+@inlined
 def solve_cranks(
-    g: Geometry,
-    branch: Branch,
-    rest: Numbers,
-    limits: Numbers,
-    q: FloatArray,
-    foot: FloatArray,
-    closure: FloatArray,
-) -> int:
-    """Solve crank angles: fill foot position and closure, return the status."""
-    foot[:] = math.nan
-    closure[:] = math.nan
-    if not (math.isfinite(q[0]) and math.isfinite(q[1]) and math.isfinite(q[2])):
-        return INVALID_INPUT
-    found, closes, a, b = solve_platform(g, branch, q)
-    if not found:
-        return SINGULAR if closes else UNREACHABLE
-    th1, th2, th3 = pantograph_of_drive(g, branch.knee, q[2], a, b)
-    if not math.isfinite(th1 + th2):
-        return UNREACHABLE
-    closure[0], closure[1], closure[2], closure[3], closure[4] = a, b, th1, th2, th3
-    foot[0], foot[1], foot[2] = in_leg_frame(*foot_point(g, th1, th2, th3))
-    pose = pose_of_angles(g, q, closure)
-    return status_of_pose(g, branch, rest, limits, (q[0], q[1], q[2]), pose)
+    g: Geometry, branch: Branch, rest: Numbers, limits: Numbers, block: FloatArray, i: int
+) -> Pose:
+    """Solve point i of a block, whose platform is found: fill foot, closure and status.
+
+    Returns:
+        The pose; NaN if there is none.
+    """
+    cranks, (a, b) = cranks_of(block, i), platform_of(block, i)
+    pantograph = pantograph_of_drive(g, branch.knee, cranks[4:6], a, b)
+    pose = pose_of_directions(g, cranks, a, b, pantograph)
+    status = status_of_pose(g, branch, rest, limits, get3(block, GIVEN, i), pose)
+    outcome = block[OUTCOME, i]
+    solved = (outcome == OK) & (status != UNREACHABLE)
+    known = 1.0 if solved else math.nan
+    block[STATUS, i] = status if outcome == OK else outcome
+    foot, closure = in_leg_frame(*foot_of_pose(g, pose)), closure_angles(pose)
+    for k in range(3):
+        block[FOUND + k, i] = foot[k] * known
+    for k in range(5):
+        block[CLOSURE + k, i] = closure[k] * known
+    return pose_of_directions(g, cranks, (a[0] * known, a[1] * known), b, pantograph)
+
+
+def _forward_kernels(find: Callable[..., None]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the kernels of the forward problem, given how the platforms of a block are found.
+
+    Crank angles (..., 3) to foot and closure (..., 8) and status (...); the second kernel also
+    gives, below each other, both Jacobians of the solved pose (..., 6, 3).
+    """
+
+    @points_kernel("(p),(points,3)->(points,8),(points)", "f8 f8 f8 u1")
+    def forward(parameters, q, coordinates, status):
+        g, branch, rest, limits = unpacked(parameters)
+        block = np.empty((ROWS, BLOCK))
+        for start in range(0, len(q), BLOCK):
+            end = min(start + BLOCK, len(q))
+            load(block, GIVEN, q, start, end, 3)
+            find(g, branch, block, end - start)
+            for i in range(end - start):
+                solve_cranks(g, branch, rest, limits, block, i)
+            store(block, FOUND, coordinates, start, end, 8)
+            for i in range(end - start):
+                status[start + i] = int(block[STATUS, i])
+
+    @points_kernel("(p),(points,3)->(points,8),(points),(points,6,3)", "f8 f8 f8 u1 f8")
+    def forward_with_twist(parameters, q, coordinates, status, twist):
+        g, branch, rest, limits = unpacked(parameters)
+        block = np.empty((ROWS, BLOCK))
+        for start in range(0, len(q), BLOCK):
+            end = min(start + BLOCK, len(q))
+            load(block, GIVEN, q, start, end, 3)
+            find(g, branch, block, end - start)
+            for i in range(end - start):
+                put_twist(g, solve_cranks(g, branch, rest, limits, block, i), block, i)
+            store(block, FOUND, coordinates, start, end, 8)
+            store_twist(block, twist, start, end)
+            for i in range(end - start):
+                status[start + i] = int(block[STATUS, i])
+
+    return forward, forward_with_twist
+
+
+_forward, _forward_with_twist = _forward_kernels(find_platforms)
+_forward_search, _forward_search_with_twist = _forward_kernels(search_platforms)
 
 
 @scalar
@@ -687,23 +852,6 @@ def fill_twist(g: Geometry, p: Pose, twist: FloatArray) -> None:
         v, omega = jacobian_columns(g, p, f1, f2, crank)
         for k in range(3):
             twist[k, crank], twist[3 + k, crank] = v[k], omega[k]
-
-
-@points_kernel("(p),(points,3)->(points,3),(points,5),(points)", "f8 f8 f8 f8 u1")
-def _forward(parameters, q, foot, closure, status):
-    """Crank angles to foot position and closure."""
-    g, branch, rest, limits = unpacked(parameters)
-    for i in range(len(q)):
-        status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
-
-
-@points_kernel("(p),(points,3)->(points,3),(points,5),(points),(points,6,3)", "f8 f8 f8 f8 u1 f8")
-def _forward_with_twist(parameters, q, foot, closure, status, twist):
-    """`_forward` and, below each other, both Jacobians of the solved pose in one pass."""
-    g, branch, rest, limits = unpacked(parameters)
-    for i in range(len(q)):
-        status[i] = solve_cranks(g, branch, rest, limits, q[i], foot[i], closure[i])
-        fill_twist(g, pose_of_angles(g, q[i], closure[i]), twist[i])
 
 
 @points_kernel("(g),(points,3),(points,5)->(points,6,3)", "f8 f8 f8 f8")
@@ -729,32 +877,6 @@ def _constraint_jacobian(geometry, q, closure, shape, jacobian):
     jacobian[2, 4], jacobian[2, 5] = -wx * p.sp3, wx * p.cp3
 
 
-@kernel("(g),(c),(b)->(c),(b)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
-def _initial_closure(geometry, shape, branch_shape, closure, signs):  # type: ignore[no-untyped-def]
-    """Closure and branch signs with all cranks at zero; NaN where a loop does not close."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    q = np.zeros(3)
-    closure[0], closure[1] = wrapped(elevation_guess(g, 0.0, 0.0)), 0.0
-    closure[2], closure[3], closure[4] = pantograph_of_drive(g, 1.0, 0.0, closure[0], closure[1])
-    p = pose_of_angles(g, q, closure)
-    f1, f2 = gradients(g, p)
-    signs[0], signs[1] = np.sign(f1.q), np.sign(f2.q)
-    signs[2] = np.sign(platform_bend(g, p))
-    signs[3] = np.sign(p.s2 * p.c1 - p.c2 * p.s1)
-    signs[4] = np.sign(f1.a * f2.b - f1.b * f2.a)
-
-
-@kernel("(g),(n),(c),(r)->(r)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
-def _passive_rest(geometry, q, closure, shape, rest):
-    """What `passive_measures` compares with: three angles and three vectors in the platform."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    p = pose_of_angles(g, q, closure)
-    rest[0], rest[1], rest[2] = axis_angles(p)
-    rest[3], rest[4], rest[5] = in_platform(p, p.x1 / g.l1, p.y1 / g.l1, p.z1 / g.l1)
-    rest[6], rest[7], rest[8] = in_platform(p, p.x2 / g.l1, p.y2 / g.l1, p.z2 / g.l1)
-    rest[9], rest[10], rest[11] = in_platform(p, p.c2 * p.s3, -p.s2, p.c2 * p.c3)
-
-
 @kernel("(g),(r),(n),(c),(p)->(p)", "f8[:], f8[:], f8[:], f8[:], f8[:], f8[:]")
 def _passive_measures(geometry, rest, q, closure, shape, result):
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
@@ -771,6 +893,18 @@ RANGE = math.radians(21.0)
 PASSIVE_RANGE = math.radians(45.0)
 FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
 UNIVERSAL_JOINTS = ("u1_along", "u1_across", "u2_along", "u2_across", "u3_along", "u3_across")
+
+
+def closed(loop: Callable[..., Any], *arguments: Any) -> Any:
+    """Return the directions that close a loop, or None if nothing does.
+
+    Where compiled code gets NaN, Python has no root of a negative number.
+    """
+    try:
+        directions = loop(*arguments)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return None if any(map(math.isnan, directions)) else directions
 
 
 @dataclass(frozen=True)
@@ -833,45 +967,63 @@ class ParallelDrive(Dimensioned):
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the initial posture."""
         self.check_fields()
-        self._initial  # noqa: B018  raises GeometryError
+        self._signs  # noqa: B018  raises GeometryError
 
     @cached_property
-    def _initial(self) -> tuple[FloatArray, FloatArray]:
-        """Closure of the initial posture (all cranks at zero) and its branch signs."""
-        g = Geometry(*self._geometry)
+    def _initial(self) -> Pose:
+        """Pose of the initial posture, with all cranks at zero, where b = 0."""
+        g = Geometry(*self._geometry.tolist())
         if not abs(0.5 * g.d - g.a) < g.l1:
             raise GeometryError(
                 f"rod_length (l1) = {g.l1} m does not span half the crank spacing less the "
                 f"platform arm, |d/2 - a| = {abs(0.5 * g.d - g.a)} m"
             )
-        closure, signs = _initial_closure(self._geometry, np.zeros(5), np.zeros(5))
-        if math.isnan(closure[0]):
+        cranks = (*direction(g.phi1), *direction(g.phi1), *direction(g.phi3))
+        a = closed(symmetric_elevation, g, cranks[0:2], cranks[4:6])
+        if not a:
             raise GeometryError(
                 "with all cranks at zero the rods (l1), cranks (m1, m3) and platform (l3) do not "
                 "close a loop: change one of these lengths or the crank zeros (phi_1, phi_3)"
             )
-        if math.isnan(closure[2]):
+        pantograph = closed(pantograph_of_drive, g, 1.0, cranks[4:6], a, (1.0, 0.0))
+        if not pantograph:
             raise GeometryError(
                 f"with all cranks at zero the pantograph's thigh (l4 = {g.l4} m) and lever "
                 f"(c, l_g: {math.hypot(g.c, g.lg):.4f} m) do not join the hip H and the platform's "
                 "drive point S"
             )
-        if np.any(signs == 0.0) or signs[3] < 0.0:
+        return pose_of_directions(g, cranks, a, (1.0, 0.0), pantograph)
+
+    @cached_property
+    def _signs(self) -> FloatArray:
+        """Branch signs of the initial posture (5,)."""
+        g, p = Geometry(*self._geometry.tolist()), self._initial
+        f1, f2 = gradients(g, p)
+        knee = p.s2 * p.c1 - p.c2 * p.s1
+        loop = f1.a * f2.b - f1.b * f2.a
+        signs = np.sign([f1.q, f2.q, platform_bend(g, p), knee, loop])
+        if not np.all(signs) or knee < 0.0:
             raise GeometryError("the posture with all cranks at zero is singular")
-        return closure, signs
+        return signs
 
     @cached_property
     def _rest(self) -> FloatArray:
-        """What the passive joints' excursions are measured from."""
-        return _passive_rest(self._geometry, np.zeros(3), self._initial[0], np.zeros(REST_SIZE))
+        """What `passive_measures` compares with: three angles and three vectors in the platform."""
+        p, l1 = self._initial, self.rod_length
+        return np.array(
+            [
+                *axis_angles(p),
+                *in_platform(p, p.x1 / l1, p.y1 / l1, p.z1 / l1),
+                *in_platform(p, p.x2 / l1, p.y2 / l1, p.z2 / l1),
+                *in_platform(p, p.c2 * p.s3, -p.s2, p.c2 * p.c3),
+            ]
+        )
 
     @cached_property
     def _across_rest(self) -> FloatArray:
         """Angles across the cranks of U1, U2, U3 in the initial posture (3,) [rad]."""
-        measures = _passive_measures(
-            self._geometry, self._rest, np.zeros(3), self._initial[0], np.zeros(9)
-        )
-        return np.arcsin(measures[ACROSS])
+        p, l1 = self._initial, self.rod_length
+        return np.arcsin([p.x1 / l1, p.x2 / l1, p.sb])
 
     @cached_property
     def _passive_bounds(self) -> FloatArray:
@@ -887,7 +1039,7 @@ class ParallelDrive(Dimensioned):
         """Return the branch signs of an assembly mode."""
         knee, center, crank_1, crank_2 = mode_signs(self, assembly_mode, FLIPPABLE)
         # Flipping the platform's bend turns the platform over, and with it the loop's orientation.
-        return self._initial[1] * [crank_1, crank_2, center, knee, center]
+        return self._signs * [crank_1, crank_2, center, knee, center]
 
     @cached_property
     def _known_parameters(self) -> dict[str, FloatArray]:
@@ -919,16 +1071,26 @@ class ParallelDrive(Dimensioned):
             the mode's solution is unique; beyond the drive's singularity the status is SINGULAR.
         """
         q = as_array("joint_positions", joint_positions, 3)
-        foot, closure, status = _forward(self._parameters(assembly_mode), q)
-        return Posture(q, closure, foot, status)
+        parameters = self._parameters(assembly_mode)
+        results = _forward(parameters, q)
+        if has_code(results[1], UNCERTAIN):
+            search = partial(_forward_search, parameters)
+            results = settled(results, results[1] == UNCERTAIN, search, (q, 1))
+        coordinates, status = results
+        return Posture(q, coordinates[..., 3:], coordinates[..., :3], status)
 
     def forward_with_twist(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray]:
         """`forward` and `twist_jacobian` in one pass."""
         q = as_array("joint_positions", joint_positions, 3)
-        foot, closure, status, twist = _forward_with_twist(self._parameters(assembly_mode), q)
-        return Posture(q, closure, foot, status), twist
+        parameters = self._parameters(assembly_mode)
+        results = _forward_with_twist(parameters, q)
+        if has_code(results[1], UNCERTAIN):
+            search = partial(_forward_search_with_twist, parameters)
+            results = settled(results, results[1] == UNCERTAIN, search, (q, 1))
+        coordinates, status, twist = results
+        return Posture(q, coordinates[..., 3:], coordinates[..., :3], status), twist
 
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the cranks, in closed form.
@@ -981,7 +1143,7 @@ class ParallelDrive(Dimensioned):
         universal = self.passive_joint_excursions(posture)[..., : len(UNIVERSAL_JOINTS)]
         universal = universal + np.stack([self._rest[:3], self._across_rest], axis=-1).ravel()
         thigh, bend = self._pantograph_angles(posture.closure)
-        thigh_rest, bend_rest = self._pantograph_angles(self._initial[0])
+        thigh_rest, bend_rest = self._pantograph_angles(np.array(closure_angles(self._initial)))
         thigh = thigh_rest + wrapped_angles(thigh - thigh_rest)
         bend = bend_rest + wrapped_angles(bend - bend_rest)
         hip = [posture.closure[..., 4], thigh]

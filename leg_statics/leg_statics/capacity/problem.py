@@ -52,13 +52,13 @@ from leg_kinematics.errors import ShapeError, ValueRangeError
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_numbers, put
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
+from leg_kinematics.kernels.settled import UNCERTAIN, settled
 from leg_kinematics.kernels.vectors import inner, tangents, unit
 from leg_statics.capacity.planes import BOUNDED, INVALID_INPUT, plane_capacity
 from leg_statics.capacity.planes import CapacityStatus as CapacityStatus
 from leg_statics.capacity.three_joint import three_joint_capacity
 from leg_statics.efforts import worst_moment_effort
 
-UNCERTAIN = 254  # instead of a `CapacityStatus`, where the quick way does not tell
 UP = np.array([0.0, 0.0, 1.0])
 UP.flags.writeable = False
 
@@ -155,32 +155,6 @@ def _load_capacity(
         return results
     inputs = zip(arguments, (2, 1, 1, 1, 0, 1), strict=True)
     return settled(results, results[-1] == UNCERTAIN, _thorough_capacity, *inputs)
-
-
-def settled(
-    results: tuple[Any, ...],
-    uncertain: Any,
-    thorough: Callable[..., Any],
-    *inputs: tuple[Any, int],
-) -> tuple[Any, ...]:
-    """Return the results of a quick kernel, what it left open replaced by those of a thorough one.
-
-    Args:
-        results: Results of the quick kernel (..., any).
-        uncertain: Which points it left open (...).
-        thorough: The thorough kernel.
-        *inputs: What it takes (..., any), and how many axes that of one point has.
-    """
-    if not uncertain.ndim:  # as points, so that the code for one is never compiled
-        found = thorough(*[np.expand_dims(array, 0) for array, _ in inputs])
-        return tuple(result[0] for result in found)
-    chosen = [
-        np.broadcast_to(array, uncertain.shape + array.shape[array.ndim - axes :])[uncertain]
-        for array, axes in inputs
-    ]
-    for result, settled_points in zip(results, thorough(*chosen), strict=True):
-        result[uncertain] = settled_points
-    return results
 
 
 def check_effort_limits(lower: FloatArray, upper: FloatArray) -> None:
