@@ -24,11 +24,12 @@ def hexapod():
 
 
 @pytest.fixture(scope="session")
-def suite():
+def suite(tmp_path_factory):
     """All nodes of the hexapod and a client; a test that changes something changes it back."""
     from leg_msgs_py.client import LegClient
 
-    parameters = {"max_points": MAX_POINTS, "diagnostics_rate": 10.0}
+    folders = f"[{tmp_path_factory.getbasetemp()}]"
+    parameters = {"max_points": MAX_POINTS, "diagnostics_rate": 10.0, "robot_folders": folders}
     with NodeProcesses(parameters=parameters) as nodes, LegClient(timeout=PATIENCE) as client:
         wait_until_ready(client, nodes)
         yield SimpleNamespace(nodes=nodes, client=client)

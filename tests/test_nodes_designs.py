@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The designs node: searches as an action, with progress, cancellation and bad studies."""
 
+import os
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
 from node_processes import find_executable
-from nodes_support import PATIENCE, START_TIMEOUT, is_served, wait_for
+from nodes_support import PATIENCE, START_TIMEOUT, is_served, set_parameter, wait_for
 
-from leg_kinematics.description import robot_from_document
+from leg_kinematics.description import find_robot_file, robot_from_document
 from leg_kinematics.documents import Document
 
 STUDY = """\
@@ -31,8 +33,9 @@ ENDLESS = STUDY.replace("designs: 64", "designs: 1000000000")
 @pytest.fixture(scope="module")
 def client(tmp_path_factory):
     """A client of a designs node of its own."""
-    results = tmp_path_factory.mktemp("results")
-    arguments = ["-r", "__ns:=/studio", "-p", f"results:={results}", "-p", "workers:=1"]
+    results, robots = tmp_path_factory.mktemp("results"), tmp_path_factory.mktemp("robots")
+    parameters = [f"output_root:={results}", f"robot_folders:=[{robots}]", "workers:=1"]
+    arguments = ["-r", "__ns:=/studio", *(word for p in parameters for word in ("-p", p))]
     node = subprocess.Popen(
         [find_executable("leg_statics", "designs_node"), "--ros-args", *arguments],
         start_new_session=True,
@@ -40,7 +43,7 @@ def client(tmp_path_factory):
     try:
         with LegClient(namespace="studio", timeout=PATIENCE) as client:
             wait_for(lambda: is_served(client, "search_geometry"), START_TIMEOUT)
-            client.results = results
+            client.results, client.robots, client.process = results, robots, node.pid
             yield client
             assert node.poll() is None
     finally:
@@ -65,14 +68,14 @@ def test_a_search_finds_designs_and_a_robot(client, tmp_path):
     )
 
 
-def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_path):
+def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client):
     progress = []
-    work = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=progress.append)
+    work = client.search_geometry.future(ENDLESS, "out", on_progress=progress.append)
     wait_for(lambda: progress and progress[-1].evaluated > 20, START_TIMEOUT)
     assert progress[-1].total == 10**9
     assert progress[-1].rate > 0.0
     assert np.isfinite(progress[-1].best).all()
-    waiting = client.search_geometry.future(STUDY, tmp_path / "other")
+    waiting = client.search_geometry.future(STUDY, "other")
     waiting.cancel()
     with pytest.raises(errors.CancelledError) as caught:
         waiting.wait()
@@ -85,7 +88,7 @@ def test_a_cancelled_search_gives_what_there_is_and_goes_on_later(client, tmp_pa
     assert len(partial.best_parameters)
     assert partial.robot
     heard = []
-    again = client.search_geometry.future(ENDLESS, tmp_path / "out", on_progress=heard.append)
+    again = client.search_geometry.future(ENDLESS, "out", on_progress=heard.append)
     wait_for(lambda: heard and heard[-1].evaluated >= partial.evaluated, START_TIMEOUT)
     again.cancel()
     with pytest.raises(errors.CancelledError):
@@ -110,7 +113,95 @@ def test_a_bad_study_is_ended_with_the_reason(client, case):
         assert word in caught.value.message
 
 
-def test_a_folder_that_cannot_be_used_is_told(client, tmp_path):
-    (tmp_path / "file").write_text("")
+def test_a_folder_that_cannot_be_used_is_told(client):
+    (client.results / "file").write_text("")
     with pytest.raises(errors.InvalidInputError, match="cannot be written: Not a directory"):
-        client.search_geometry(STUDY, tmp_path / "file" / "out")
+        client.search_geometry(STUDY, "file/out")
+
+
+def processor_time(process: int) -> float:
+    """Return the processor time that a process has taken [s]."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def greatest_memory(process: int) -> int:
+    """Return the most memory that a process ever had [bytes]."""
+    text = Path(f"/proc/{process}/status").read_text()
+    return 1024 * int(text.partition("VmHWM:")[2].split()[0])
+
+
+LAUGHS = "a: &a [1, 2, 3, 4, 5, 6, 7, 8, 9]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize("study", [LAUGHS, STUDY + "x: " + "[" * 60_000, "- 1\n" * 1_000_000])
+def test_a_study_without_end_costs_neither_time_nor_memory(client, study):
+    before, memory = processor_time(client.process), greatest_memory(client.process)
+    with pytest.raises(errors.InvalidInputError, match=r"study:?\d*: .*(allowed|deeper)"):
+        client.search_geometry(study)
+    assert processor_time(client.process) - before < 1.0
+    assert greatest_memory(client.process) - memory < len(study) * 5 + 50e6
+
+
+def test_results_go_below_the_output_root_only(client, tmp_path):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (client.results / "link").symlink_to(outside)
+    within = client.results / "with_links"
+    within.mkdir(exist_ok=True)
+    (within / "designs.csv").symlink_to(outside / "designs.csv")
+    homes = ("~/out", "~nobody_at_all/out")
+    for folder in (outside, "../outside", "link", "link/below", "with_links", *homes):
+        with pytest.raises(errors.InvalidInputError, match=r"allowed: a path below|no home folder"):
+            client.search_geometry(STUDY, folder)
+    assert not list(outside.iterdir())
+    found = client.search_geometry(STUDY, client.results / "deep" / "down")
+    assert found.folder == str(client.results / "deep" / "down")
+    assert (client.results / "deep" / "down" / "designs.csv").is_file()
+
+
+def test_robots_are_shipped_or_in_allowed_folders_and_no_answer_tells_what_is_in_a_file(
+    client, tmp_path
+):
+    shipped = find_robot_file("quadruped").read_text()
+    (client.robots / "mine.yaml").write_text(shipped)
+    (client.robots / "note.yaml").write_text("password: open sesame")
+    (client.robots / "broken.yaml").write_text("password: {open sesame")
+    secret = tmp_path / "secret.yaml"
+    secret.write_text("password: open sesame")
+    (client.robots / "link.yaml").symlink_to(secret)
+    for robot, words in (
+        ("note.yaml", "is no robot description"),
+        ("broken.yaml", "is no robot description"),
+        (secret, "robot_folders"),
+        ("link.yaml", "robot_folders"),
+        ("../" * 20 + str(secret)[1:], "robot_folders"),
+        ("~/robot.yaml", "robot_folders"),
+        ("~nobody_at_all/robot.yaml", "robot_folders"),
+        ("/etc/passwd", "robot_folders"),
+        ("nothing.yaml", "robot_folders"),
+    ):
+        with pytest.raises(errors.InvalidInputError, match=words) as caught:
+            client.search_geometry(STUDY.replace("leg_type", f"robot: {robot}, leg_type"))
+        assert "sesame" not in caught.value.message
+        assert "root:" not in caught.value.message
+    with pytest.raises(errors.InvalidInputError, match=r"base\.leg_type: unknown leg type"):
+        client.search_geometry(STUDY.replace("leg_type", "robot: mine.yaml, leg_type"))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("output_root", "/"),
+        ("robot_folders", ["/"]),
+        ("scheduler", "tcp://127.0.0.1:8786"),
+        ("workers", 1000),
+    ],
+)
+def test_what_opens_the_machine_cannot_be_set_at_run_time(client, name, value):
+    result = set_parameter(client.node, "studio/designs", name, value)
+    assert not result.successful
+    assert "read-only" in result.reason

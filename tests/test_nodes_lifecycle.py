@@ -83,20 +83,26 @@ def test_new_limits_change_the_utilisation(suite):
 
 @pytest.mark.parametrize("server", ["kinematics", "statics"])
 def test_a_wrong_robot_is_refused_with_the_reason_and_the_old_one_stays(
-    suite, hexapod_file, server
+    suite, hexapod_file, server, tmp_path_factory
 ):
     node = suite.client.node
     wrong = hexapod_file("wrong", ("rod_length: 220", "rod_length: -220"))
+    secret = str(tmp_path_factory.getbasetemp().parent / f"secret_{os.getpid()}.yaml")
+    Path(secret).write_text("password: open sesame")
     for value, words in (
         (wrong, ["wrong.yaml", "rod_length", "-220"]),
         ("decapod", ["decapod", "hexapod"]),
-        ("/nowhere/robot.yaml", ["/nowhere/robot.yaml"]),
+        ("/nowhere/robot.yaml", ["/nowhere/robot.yaml", "robot_folders"]),
+        (secret, [secret, "robot_folders"]),
+        ("~nobody_at_all/robot.yaml", ["robot_folders"]),
         ("", ["shipped robots"]),
     ):
         result = set_parameter(node, server, "robot", value)
         assert not result.successful
         for word in words:
             assert word in result.reason
+        assert "sesame" not in result.reason
+    Path(secret).unlink()
     assert len(suite.client.legs()) == 6
     assert suite.client.inverse_kinematics("left_front", FOOT).status == 0
 
@@ -109,6 +115,7 @@ def test_a_wrong_robot_is_refused_with_the_reason_and_the_old_one_stays(
         ("statics", "friction_coefficient", "rough"),
         ("statics", "state_rate_limit", -1.0),
         ("statics", "diagnostics_rate", 2.0),  # read-only
+        ("statics", "robot_folders", ["/"]),  # read-only
         ("kinematics", "max_points", 0),
         ("kinematics", "robot", 6),
         ("kinematics", "colour", "red"),

@@ -10,7 +10,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 # name, default and description of each argument, which is a parameter of the node as well
 ARGUMENTS = (
     ("robot", "hexapod", "YAML file or name of a shipped robot, for studies that name none"),
-    ("results", "~/.ros/geometry_searches", "Folder for the results of goals that name none"),
+    ("output_root", "~/.ros/geometry_searches", "Folder below which all results go"),
     ("workers", "0", "Worker processes; 0 for one a processor core"),
     ("scheduler", "", "Address of a Dask scheduler, to use its workers instead"),
 )

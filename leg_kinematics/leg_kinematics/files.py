@@ -34,6 +34,26 @@ def user_path(path: str | os.PathLike[str]) -> Path:
         ) from None
 
 
+def path_below(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
+    """Return an absolute path in a folder, with all links and `..` followed.
+
+    Args:
+        folder: The folder; it need not exist.
+        path: The path: absolute, or from the folder.
+
+    Raises:
+        DescriptionError: If it leads out of the folder, or cannot be followed.
+    """
+    try:
+        top = user_path(folder).resolve()
+        found = (top / user_path(path)).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # endless links, null bytes
+        raise DescriptionError(f"{str(path)!r}: cannot be followed: {error}") from None
+    if not found.is_relative_to(top):
+        raise DescriptionError(f"{path}: allowed: a path below {top}")
+    return found
+
+
 def existing_path(what: str, path: str | os.PathLike[str]) -> Path:
     """Return a path with its `~` written out.
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -30,6 +31,7 @@ from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.nodes.health import Health
 from leg_kinematics.nodes.node_log import LibraryLog, NodeLog
 from leg_kinematics.nodes.requests import RequestError, error_code
+from leg_kinematics.nodes.robot_folders import find_allowed_robot
 from leg_kinematics.nodes.service import Service
 from leg_kinematics.robot import Robot
 from leg_kinematics.warm_up import warm_up_kinematics
@@ -49,8 +51,8 @@ class RobotNode(Node):
     """A node that serves the legs of one robot description.
 
     A subclass offers its services with `serve` and calls `announce` when it is ready. The robot
-    can be exchanged at run time by setting the parameter `robot`; a description that is refused
-    leaves the old one in force.
+    can be exchanged at run time by setting the parameter `robot`, to what `robot_folders` allows; a
+    description that is refused leaves the old one in force.
 
     Args:
         name: Name of the node.
@@ -69,6 +71,12 @@ class RobotNode(Node):
         self.declare(
             "robot", "hexapod", "Robot description: path of a YAML file or name of a shipped robot."
         )
+        self.declare(
+            "robot_folders",
+            ["~/.ros/robots"],
+            "Folders of the descriptions that the parameter robot may be set to at run time.",
+            read_only=True,
+        )
         self.declare_number(
             "max_points", 1_000_000, "Points accepted in one request.", (1, 10_000_000)
         )
@@ -83,7 +91,8 @@ class RobotNode(Node):
         )
         _check_service_events(self.value("service_events"))
         self._served: list[ServiceServer] = []
-        self.robot: Robot = load_robot(self.value("robot"))
+        self._robot_at_start = self.value("robot")
+        self.robot: Robot = load_robot(self._robot_at_start)
         self.warm_up(self.robot)
         self._candidate = self.robot
         self.add_on_set_parameters_callback(self._check_parameters)
@@ -136,7 +145,7 @@ class RobotNode(Node):
         for parameter in parameters:
             try:
                 if parameter.name == "robot":
-                    candidate = load_robot(parameter.value)
+                    candidate = load_robot(self._robot_file(parameter.value))
                     self.warm_up(candidate)
                     self._candidate = candidate
                 elif parameter.name == "service_events":
@@ -146,6 +155,12 @@ class RobotNode(Node):
                 self.get_logger().error(f"parameter {parameter.name} refused: {error}")
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _robot_file(self, source: str) -> str | Path:
+        """Return the description that a robot's new name or path stands for."""
+        if source == self._robot_at_start:  # whoever started the node may have it read again
+            return source
+        return self.find_robot(source)
 
     def _apply_parameters(self, parameters: Sequence[Parameter]) -> None:
         names = [parameter.name for parameter in parameters]
@@ -163,6 +178,14 @@ class RobotNode(Node):
         service.configure_introspection(self.get_clock(), SERVICE_QOS, state)
 
     # ------------------------------------------------------------------ for subclasses
+
+    def find_robot(self, source: str) -> Path:
+        """Return a robot description that anyone may have this node read.
+
+        Raises:
+            DescriptionError: If it is neither shipped nor in one of the `robot_folders`.
+        """
+        return find_allowed_robot(source, self.value("robot_folders"))
 
     def warm_up(self, robot: Robot) -> None:
         """Call what requests will call once, so that no request waits for a compiler."""

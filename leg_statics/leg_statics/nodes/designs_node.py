@@ -18,7 +18,10 @@ import numpy as np
 from leg_msgs.action import SearchGeometry
 from leg_msgs_py.arrays import to_field
 
+from leg_kinematics.description import load_robot
 from leg_kinematics.documents import Document
+from leg_kinematics.errors import DescriptionError
+from leg_kinematics.files import exists, path_below
 from leg_kinematics.nodes.node_process import run
 from leg_kinematics.nodes.robot_node import RobotNode
 from leg_statics.design.search.jobs import SearchJob
@@ -79,12 +82,20 @@ class DesignsNode(RobotNode):
     def __init__(self) -> None:
         super().__init__("designs")
         self.declare(
-            "results", "~/.ros/geometry_searches", "Folder for the results of goals that name none."
+            "output_root",
+            "~/.ros/geometry_searches",
+            "Folder below which all results go.",
+            read_only=True,
         )
         self.declare_number(
-            "workers", 0, "Worker processes; 0 for one a processor core.", (0, 1024)
+            "workers", 0, "Worker processes; 0 for one a processor core.", (0, 1024), read_only=True
         )
-        self.declare("scheduler", "", "Address of a Dask scheduler to use its workers instead.")
+        self.declare(
+            "scheduler",
+            "",
+            "Address of a Dask scheduler to use its workers instead; it can run any code here.",
+            read_only=True,
+        )
         self._queue = GoalQueue(
             self, SearchGeometry, "search_geometry", "searches", self._begin, self.failure
         )
@@ -102,16 +113,42 @@ class DesignsNode(RobotNode):
             LegError: If it cannot be carried out.
         """
         document = Document(Path("study"), request.study)  # messages name the field
-        study = study_from_document(document, self.value("robot"))
-        folder = Path(request.folder or self._new_folder(study)).expanduser().absolute()
+        study = study_from_document(document, self.value("robot"), self._find_base)
+        folder = self._folder(request.folder or self._new_name(study))
         workers = partial(open_workers, self.value("workers") or None, self.value("scheduler"))
         return _SearchWork(study, folder, SearchJob(study, folder, workers, pool))
 
-    def _new_folder(self, study: Study) -> Path:
+    def _find_base(self, source: str) -> Path:
+        """Return the description of the robot that a study names.
+
+        Raises:
+            DescriptionError: If it cannot be used; the message tells nothing of its content.
+        """
+        path = self.find_robot(source)
+        try:
+            load_robot(path)
+        except DescriptionError:
+            raise DescriptionError(
+                f"{source!r} is no robot description; load_robot tells why on the node's machine"
+            ) from None
+        return path
+
+    def _folder(self, name: str) -> Path:
+        """Return the folder for the results of a goal.
+
+        Raises:
+            DescriptionError: If it, or a file of earlier results in it, is not below `output_root`.
+        """
+        folder = path_below(self.value("output_root"), name)
+        if folder.is_dir():
+            for file in folder.iterdir():
+                path_below(folder, file)
+        return folder
+
+    def _new_name(self, study: Study) -> str:
         stem = f"{study.name}_{time.strftime('%Y%m%d_%H%M%S')}"
         names = itertools.chain([stem], (f"{stem}_{k}" for k in itertools.count(2)))
-        results = Path(self.value("results")).expanduser()
-        return next(results / name for name in names if not (results / name).exists())
+        return next(name for name in names if not exists(self._folder(name)))
 
 
 def main() -> int:

@@ -32,7 +32,8 @@ from __future__ import annotations
 import difflib
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ import numpy as np
 from leg_kinematics.description import UNITS, find_robot_file, leg_types_of, robot_from_document
 from leg_kinematics.documents import NAME, NUMBER, Document, mapping_schema
 from leg_kinematics.errors import LegError, UnknownNameError
-from leg_kinematics.files import user_path
+from leg_kinematics.files import exists, user_path
 from leg_kinematics.geometry import SI_UNITS, geometry_parameters
 from leg_kinematics.robot import Leg
 from leg_statics.design.designs import METRICS, Conditions, missing_condition, supported_metrics
@@ -126,15 +127,24 @@ def load_study(path: str | os.PathLike[str]) -> Study:
         DescriptionError: If anything in it is wrong; the message names file, line, key, the value
             and what is allowed.
     """
-    return study_from_document(Document(user_path(path)))
+    document = Document(user_path(path))
+
+    def find_beside(source: str) -> Path:
+        beside = document.path.parent / user_path(source)
+        return beside if exists(beside) else find_robot_file(source)
+
+    return study_from_document(document, find_robot=find_beside)
 
 
-def study_from_document(document: Document, robot: str = "") -> Study:
+def study_from_document(
+    document: Document, robot: str = "", find_robot: Callable[[str], Path] = find_robot_file
+) -> Study:
     """Build a study from a parsed file.
 
     Args:
         document: The file.
         robot: Robot of a study that names none; "" if it must.
+        find_robot: Finds the description of a robot that a study names, or raises a LegError.
 
     Raises:
         DescriptionError: If anything in it is wrong.
@@ -144,7 +154,7 @@ def study_from_document(document: Document, robot: str = "") -> Study:
     root = document.root
     document.check(METHOD_SCHEMAS[root["method"]["name"]], "method")
     units = {k: UNITS[k][v] for k, v in root["units"].items()} | {"ratio": 1.0}
-    robot_document, leg = _load_base(document, robot)
+    robot_document, leg = _load_base(document, robot, find_robot)
     parameters = tuple(
         _parameter(document, name, leg.geometry, units) for name in root["parameters"]
     )
@@ -174,15 +184,15 @@ def _check_version(document: Document) -> None:
         )
 
 
-def _load_base(document: Document, robot: str) -> tuple[Document, Leg]:
+def _load_base(
+    document: Document, robot: str, find_robot: Callable[[str], Path]
+) -> tuple[Document, Leg]:
     """Return the robot's description and a leg of the type to be improved."""
     base = document.root["base"]
-    source = str(base.get("robot", robot))
-    if not source:
+    if not base.get("robot", robot):
         raise document.error("missing key 'robot'", "base")
-    beside = document.path.parent / source
     try:
-        path = beside if beside.is_file() else find_robot_file(source)
+        path = find_robot(str(base["robot"])) if "robot" in base else find_robot_file(robot)
         description = Document(path)
         robot_from_document(description)
         if base["leg_type"] not in description.root["leg_types"]:
