@@ -4,20 +4,22 @@
 from __future__ import annotations
 
 import re
-import shutil
 import sqlite3
+import stat
 import tempfile
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path, PurePath
 from typing import NamedTuple
 
-from backports import zstd
 from leg_msgs_py.recordings.errors import BagError, McapDamageError
+from leg_msgs_py.recordings.mcap_index import McapIndex
 from leg_msgs_py.recordings.mcap_scan import MAGIC as MCAP_MAGIC
 from leg_msgs_py.recordings.mcap_scan import Channel, McapScan
+from leg_msgs_py.recordings.unpacking import unpack_file
 from rosbags.interfaces import (
     ConnectionExtRosbag2,
     MessageDefinition,
@@ -29,10 +31,10 @@ from rosbags.rosbag2.metadata import parse_qos
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-SLICE = 2**14  # bytes that are decompressed at once: what precedes a fault is kept
+MOST_METADATA = 2**18  # bytes; more is not read, as if a recorder had left none
+MOST_QOS = 2**13  # characters of what a topic's publishers offered
 SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 SQLITE_MAGIC = b"SQLite format 3\0"
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # a message in CDR begins otherwise
 FORMATS = {
     "ros2msg": MessageDefinitionFormat.MSG,
     "ros2idl": MessageDefinitionFormat.IDL,
@@ -59,7 +61,7 @@ class Topic(NamedTuple):
 
 def find_files(path: Path) -> tuple[list[Path], int | None]:
     """Return the files of a recording, and how many messages its metadata tells."""
-    if path.is_file():
+    if path.exists() and not path.is_dir():
         if not path.name.endswith(SUFFIXES):
             raise BagError(f"{path}: no recording; allowed: a folder, or {', '.join(SUFFIXES)}")
         return [path], None
@@ -67,8 +69,10 @@ def find_files(path: Path) -> tuple[list[Path], int | None]:
         raise BagError(f"{path} does not exist")
     listed, expected = [], None
     # A recorder that was killed leaves no metadata, or half of it.
-    with suppress(OSError, ValueError, YAMLError, KeyError, TypeError):
-        text = (path / "metadata.yaml").read_text(encoding="utf-8")
+    with suppress(OSError, ValueError, YAMLError, KeyError, TypeError, RecursionError, BagError):
+        check_regular(path / "metadata.yaml")
+        with (path / "metadata.yaml").open(encoding="utf-8") as file:
+            text = file.read(MOST_METADATA)
         metadata = YAML(typ="safe").load(text)["rosbag2_bagfile_information"]
         listed = [path / PurePath(name).name for name in metadata["relative_file_paths"]]
         expected = int(metadata["message_count"])
@@ -85,22 +89,28 @@ def _natural(file: Path) -> list[tuple[int, str]]:
 
 
 @contextmanager
-def plain_file(file: Path) -> Iterator[Path]:
-    """Give a file without compression; of a damaged one, what comes before the damage."""
+def plain_file(file: Path) -> Iterator[tuple[Path, str]]:
+    """Give a file without compression, of a damaged one what comes before the damage.
+
+    With it comes what is wrong, unless that shows in the file without compression.
+    """
     if file.suffix != ".zstd" or not file.is_file():
-        yield file
+        yield file, ""
         return
     with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder, file.stem)
-        # Cut off or corrupt: what is missing shows in the plain file.
-        with suppress(zstd.ZstdError, EOFError), zstd.open(file) as packed, plain.open("wb") as out:
-            shutil.copyfileobj(packed, out, SLICE)
-        yield plain
+        fault = unpack_file(file, plain)
+        yield plain, f"the file {fault}" if fault else ""
 
 
-def decompressed(data: bytes) -> bytes:
-    """Return a message that may be compressed by itself, as rosbag2's message mode does."""
-    return zstd.decompress(data) if data[:4] == ZSTD_MAGIC else data
+def check_regular(file: Path) -> None:
+    """Raise a BagError if a file is a pipe or a device, which may never end, or a folder.
+
+    Raises:
+        OSError: If there is no such file.
+    """
+    if not stat.S_ISREG(file.stat().st_mode):
+        raise BagError(f"{file}: is no regular file")
 
 
 class BagFile:
@@ -130,24 +140,50 @@ class BagFile:
 def open_file(file: Path) -> BagFile:
     """Open a file by its index, or if it has none, from the front."""
     try:
-        return _Sound(file)
-    except Exception as error:  # readers raise all sorts of them at damaged content
-        reason = str(error) or type(error).__name__
-    magic = b""
-    with suppress(OSError), file.open("rb") as stream:
-        magic = stream.read(len(SQLITE_MAGIC))
-    if magic == SQLITE_MAGIC:
-        return _TornSqlite(file, reason)
+        check_regular(file)
+        with file.open("rb") as stream:
+            magic = stream.read(len(SQLITE_MAGIC))
+    except (OSError, BagError) as error:
+        return BagFile(str(error))
+    indexed: type[BagFile]
+    torn: type[_Torn]
     if magic.startswith(MCAP_MAGIC):
-        return _TornMcap(file, reason)
-    return BagFile(reason)
+        indexed, torn = _IndexedMcap, _TornMcap
+    elif magic == SQLITE_MAGIC:
+        indexed, torn = _Sqlite, _TornSqlite
+    else:
+        return BagFile("its magic is that of no recording" if magic else "it is empty")
+    try:
+        return indexed(file)
+    except Exception as error:  # readers raise all sorts of them at damaged content
+        return torn(file, str(error) or type(error).__name__)
 
 
-class _Sound(BagFile):
-    """A file that has its index."""
+class _IndexedMcap(BagFile):
+    """An mcap file with a sound index."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
+        self._index = McapIndex(file)
+        _check_profile(self._index.profile)
+        self._topics = {number: _topic(c) for number, c in self._index.channels.items()}
+        self.topics = list(self._topics.values())
+        for number, topic in self._topics.items():
+            self.counts[topic.name] += self._index.counts.get(number, 0)
+        self.span = self._index.span
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[Topic, int, bytes]]:
+        chosen = {number for number, topic in self._topics.items() if topic.name in topics}
+        for number, time, data in self._index.messages(chosen) if chosen else ():
+            yield self._topics[number], time, data
+
+
+class _Sqlite(BagFile):
+    """A database that is whole."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        _check_offers(file)
         self._reader = Reader(file)
         self._reader.open()
         self._topics = {
@@ -169,6 +205,26 @@ class _Sound(BagFile):
 
     def close(self) -> None:
         self._reader.close()
+
+
+def _check_offers(file: Path) -> None:
+    """Raise a BagError if the YAML of a topic is longer than its reader should be given."""
+    with closing(_database(file)) as database:
+        names = {row[1] for row in database.execute("PRAGMA table_info(topics)")}
+        if "offered_qos_profiles" in names:
+            query = "SELECT max(length(offered_qos_profiles)) FROM topics"
+            longest = database.execute(query).fetchone()[0] or 0
+            if longest > MOST_QOS:
+                raise BagError(f"a topic offers {longest} characters; allowed: {MOST_QOS}")
+
+
+def _database(file: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{file.absolute().as_uri()}?immutable=1", uri=True)
+
+
+def _check_profile(profile: str) -> None:
+    if profile != "ros2":
+        raise McapDamageError(f"its profile is {profile!r}; allowed: 'ros2'")
 
 
 class _Torn(BagFile, ABC):
@@ -205,9 +261,10 @@ class _TornMcap(_Torn):
         scan = McapScan(self._file)
         try:
             for number, time, data in scan.messages():
-                if scan.profile != "ros2":
-                    raise McapDamageError(f"its profile is {scan.profile!r}; allowed: 'ros2'")
+                _check_profile(scan.profile)
                 if number not in self._topics:
+                    if number not in scan.channels:
+                        raise McapDamageError(f"a message of the unknown channel {number}")
                     self._topics[number] = _topic(scan.channels[number])
                 yield self._topics[number], time, data
         except McapDamageError as error:
@@ -218,8 +275,7 @@ class _TornSqlite(_Torn):
     """A database of which pages are missing."""
 
     def _read(self) -> Iterator[tuple[Topic, int, bytes]]:
-        where = f"{self._file.absolute().as_uri()}?immutable=1"
-        with closing(sqlite3.connect(where, uri=True)) as database:
+        with closing(_database(self._file)) as database:
             try:
                 database.execute("PRAGMA writable_schema = ON")  # tolerates that pages are missing
                 for number, name, kind in database.execute("SELECT id, name, type FROM topics"):
@@ -237,9 +293,13 @@ class _TornSqlite(_Torn):
 def _topic(channel: Channel) -> Topic:
     """Return a topic of an mcap file."""
     form = FORMATS.get(channel.encoding, MessageDefinitionFormat.NONE)
-    qos: Sequence[Qos] = ()
-    with suppress(ReaderError, LookupError, TypeError):
-        qos = parse_qos(channel.qos)
-    return Topic(
-        channel.topic, channel.type, MessageDefinition(form, channel.definition), tuple(qos)
-    )
+    definition = MessageDefinition(form, channel.definition)
+    return Topic(channel.topic, channel.type, definition, _offers(channel.qos[:MOST_QOS]))
+
+
+@lru_cache
+def _offers(text: str) -> tuple[Qos, ...]:
+    """Return what publishers offered; nothing if the YAML is not as rosbag2 writes it."""
+    with suppress(ReaderError, LookupError, TypeError, ValueError, RecursionError):
+        return tuple(parse_qos(text))
+    return ()

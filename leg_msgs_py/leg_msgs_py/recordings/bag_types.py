@@ -26,6 +26,10 @@ from rosbags.typesys import (
 )
 from rosbags.typesys.store import Typestore
 
+MOST_CHARACTERS = 2**20  # of all definitions of a recording
+MOST_FIELDS = 2000  # of a type with all the types of its fields
+MOST_ELEMENTS = 10**6  # of a field of fixed size
+FIELD = re.compile(r"^[ \t]*[A-Za-z][^#\n\[]*(?:\[<?=?(\d{0,18}))?", re.MULTILINE)
 EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 # What all service events have. rosbag2 leaves it out of definitions. Where ROS says char here and
 # means uint8, the parser understands something else, which has another hash.
@@ -53,27 +57,52 @@ def installed_types(names: Iterable[str]) -> Typestore:
     return types
 
 
-def bag_types(topics: Collection[Topic]) -> Typestore:
+def bag_types(topics: Collection[Topic]) -> tuple[Typestore, dict[str, str]]:
     """Return the types that a recording defines, and for those it does not, the installed ones.
+
+    Returns:
+        The types, and why definitions of others were not read, by their names.
 
     Raises:
         BagError: If it defines a type in two ways.
     """
-    types = get_typestore(Stores.EMPTY)
+    types, refused = get_typestore(Stores.EMPTY), _refused_types(topics)
     for topic in topics:
         defined = {}
-        with suppress(TypesysError):  # what one topic says in another way shall not hide the others
-            defined = _defined_types(topic)
+        if topic.type not in refused:
+            # what one topic says in another way shall not hide the others
+            with suppress(TypesysError, RecursionError):
+                defined = _defined_types(topic)
         try:
             types.register(defined)
         except TypesysError as error:
             raise BagError(f"{topic.name}: {error}") from None
     for topic in topics:
-        if topic.type not in types.fielddefs:
+        if topic.type not in types.fielddefs and topic.type not in refused:
             with suppress(UnknownTypeError):  # it can be copied, but not decoded
                 installed = installed_types([topic.type]).fielddefs
                 types.register({k: v for k, v in installed.items() if k not in types.fielddefs})
-    return types
+    return types, refused
+
+
+def _refused_types(topics: Iterable[Topic]) -> dict[str, str]:
+    """Return the types whose definitions would keep the parser for more than seconds, and why.
+
+    It takes a fifth of a millisecond for a line, and what decodes a field is compiled.
+    """
+    refused, characters = {}, 0
+    for definition, topic in {topic.definition: topic for topic in topics}.items():
+        sizes = [int(size or 0) for size in FIELD.findall(definition.data)]
+        characters += len(definition.data)
+        for count, what, most in (
+            (len(sizes), "fields", MOST_FIELDS),
+            (max(sizes, default=0), "elements of a field", MOST_ELEMENTS),
+            (characters, "characters of definitions", MOST_CHARACTERS),
+        ):
+            if count > most:
+                reason = f"its definition has {count} {what}; allowed: at most {most}"
+                refused.setdefault(topic.type, reason)
+    return refused
 
 
 def _defined_types(topic: Topic) -> Any:

@@ -22,13 +22,13 @@ from typing import Any, NamedTuple
 from leg_msgs_py.recordings.bag_files import (
     BagFile,
     Topic,
-    decompressed,
     find_files,
     open_file,
     plain_file,
 )
 from leg_msgs_py.recordings.bag_types import bag_types
 from leg_msgs_py.recordings.errors import BagError
+from leg_msgs_py.recordings.unpacking import unpack_message
 from rosbags.interfaces import MessageDefinitionFormat
 
 
@@ -87,6 +87,7 @@ class Bag:
         self.topics: dict[str, Topic] = {}
         self.counts: Counter[str] = Counter()
         self.damages: dict[str, Damage] = {}
+        self._faults: dict[str, str] = {}  # why files were not unpacked to their end
         times: list[int] = []
         for file in self.files:
             with self._opened(file) as part:
@@ -100,7 +101,7 @@ class Bag:
         if not self.topics:
             reasons = "; ".join(damage.reason for damage in self.damages.values())
             raise BagError(f"{self.path}: nothing can be read: {reasons or 'it has no topics'}")
-        self.types = bag_types(self.topics.values())
+        self.types, self._refused = bag_types(self.topics.values())
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[BagMessage]:
         """Yield the messages of topics, none for all, in the order of recording.
@@ -114,7 +115,7 @@ class Bag:
                 fault = ""
                 try:
                     for topic, time, data in part.messages(chosen):
-                        yield BagMessage(topic.name, topic.type, time, decompressed(data))
+                        yield BagMessage(topic.name, topic.type, time, unpack_message(data))
                         count += 1
                 except Exception as error:  # readers raise all sorts of them at damaged content
                     fault = str(error) or type(error).__name__
@@ -128,7 +129,8 @@ class Bag:
             BagError: If its type is not known, or its content does not fit the type.
         """
         if message.type not in self.types.fielddefs:
-            raise BagError(f"{message.topic}: the type {message.type!r} is not known")
+            reason = self._refused.get(message.type, "it is defined neither there nor here")
+            raise BagError(f"{message.topic}: the type {message.type!r} is not known: {reason}")
         try:
             return self.types.deserialize_cdr(message.data, message.type)
         except Exception as error:  # the decoders are generated, and garbage takes any way out
@@ -137,8 +139,10 @@ class Bag:
     @contextmanager
     def _opened(self, file: Path) -> Iterator[BagFile]:
         """Open a file of the recording."""
-        with plain_file(file) as plain:
+        with plain_file(file) as (plain, fault):
             part = open_file(plain)
+            if fault:
+                self._faults[file.name] = part.damage = fault
             try:
                 yield part
             finally:
@@ -154,4 +158,4 @@ class Bag:
             self.topics[topic.name] = topic
 
     def _note(self, file: Path, count: int, reason: str) -> None:
-        self.damages[file.name] = Damage(file.name, count, reason)
+        self.damages[file.name] = Damage(file.name, count, self._faults.get(file.name, reason))

@@ -14,17 +14,15 @@ import struct
 import zlib
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
-from backports import zstd
 from leg_msgs_py.recordings.errors import McapDamageError
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+from leg_msgs_py.recordings.unpacking import LARGEST, most_unpacked, unpack
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 1, 2, 3, 4, 5, 6, 15
 NEEDED = {HEADER, SCHEMA, CHANNEL, MESSAGE, CHUNK}  # the others are skipped unread
-LARGEST = 2**28  # bytes of a record; a size beyond it is itself a sign of damage
-SLICE = 2**14  # bytes that a decompressor is given at once: what precedes a fault is kept
+NO_RECORD = 0  # no opcode, but what a hole in a file is read as
 
 
 class Channel(NamedTuple):
@@ -60,6 +58,7 @@ class McapScan:
         self.profile = ""
         self.channels: dict[int, Channel] = {}
         self._path = path
+        self._room = most_unpacked(path.stat().st_size)  # for what chunks have yet to unpack
         self._schemas: dict[int, tuple[str, str, str]] = {}
 
     def messages(self) -> Iterator[tuple[int, int, bytes]]:
@@ -81,24 +80,38 @@ class McapScan:
     ) -> Generator[tuple[int, int, bytes], None, bool]:
         """Yield the messages of a file or of a chunk; return whether it has the mark of its end."""
         while (start := stream.tell()) < end:
-            opcode, size = _record_head(stream)
+            opcode, size = record_head(stream)
             left = end - stream.tell()
             if opcode in (DATA_END, FOOTER):
                 return True
+            if opcode == NO_RECORD:
+                raise McapDamageError(f"there is no record at byte {start}")
             if opcode not in NEEDED:
                 stream.seek(min(size, left), io.SEEK_CUR)
             elif size > LARGEST:
                 raise McapDamageError(f"a record at byte {start} claims {size} bytes")
             elif opcode == CHUNK:
-                yield from self._chunk(stream.read(min(size, left)), start)
+                if isinstance(stream, io.BytesIO):
+                    raise McapDamageError(f"there is a chunk within a chunk at byte {start}")
+                yield from self.chunk(stream.read(min(size, left)), start)
             elif size <= left:
-                yield from self._note(opcode, stream.read(size), start)
+                yield from self.note(opcode, stream.read(size), start)
             if size > left:
                 raise McapDamageError(f"the record at byte {start} is cut off")
         return False
 
-    def _chunk(self, chunk: bytes, start: int) -> Iterator[tuple[int, int, bytes]]:
-        content, fault = _unpack(chunk)
+    def chunk(self, chunk: bytes, start: int) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the messages of a chunk before its damage, as `messages` does.
+
+        Args:
+            chunk: The record of the chunk.
+            start: Where in the file it begins, for what is told.
+
+        Raises:
+            McapDamageError: Where the damage begins.
+        """
+        content, fault = _unpacked(chunk, min(self._room, LARGEST))
+        self._room -= len(content)
         try:
             yield from self._messages(io.BytesIO(content), len(content))
         except McapDamageError as error:
@@ -106,20 +119,20 @@ class McapScan:
         if fault:
             raise McapDamageError(f"the chunk at byte {start} {fault}")
 
-    def _note(self, opcode: int, content: bytes, start: int) -> Iterator[tuple[int, int, bytes]]:
+    def note(self, opcode: int, content: bytes, start: int) -> Iterator[tuple[int, int, bytes]]:
         """Take up a record; yield it if it is a message."""
         try:
             if opcode == MESSAGE:
                 channel, _, log_time, _ = struct.unpack_from("<HIQQ", content)
                 yield channel, log_time, content[22:]
             elif opcode == HEADER:
-                self.profile = _Fields(content).text()
+                self.profile = Fields(content).text()
             elif opcode == SCHEMA:
-                fields = _Fields(content)
+                fields = Fields(content)
                 number = fields.number("<H")
                 self._schemas[number] = (fields.text(), fields.text(), fields.text())
             elif opcode == CHANNEL:
-                fields = _Fields(content)
+                fields = Fields(content)
                 number, schema = fields.number("<H"), fields.number("<H")
                 topic, _ = fields.text(), fields.text()
                 qos = fields.mapping().get("offered_qos_profiles", "")
@@ -129,7 +142,7 @@ class McapScan:
             raise McapDamageError(f"the record at byte {start} is garbled: {error}") from None
 
 
-def _record_head(stream: BinaryIO) -> tuple[int, int]:
+def record_head(stream: BinaryIO) -> tuple[int, int]:
     """Return opcode and size of the record that begins here."""
     start = stream.tell()
     head = stream.read(9)
@@ -139,9 +152,9 @@ def _record_head(stream: BinaryIO) -> tuple[int, int]:
     return opcode, size
 
 
-def _unpack(chunk: bytes) -> tuple[bytes, str]:
+def _unpacked(chunk: bytes, most: int) -> tuple[bytes, str]:
     """Return the records of a chunk, as far as they can be had, and what is wrong with it."""
-    fields = _Fields(chunk)
+    fields = Fields(chunk)
     try:
         fields.skip(16)
         size, checksum = fields.number("<Q"), fields.number("<I")
@@ -150,7 +163,7 @@ def _unpack(chunk: bytes) -> tuple[bytes, str]:
     except (struct.error, UnicodeDecodeError):
         return b"", "is cut off"
     packed = fields.rest()[:packed_size]
-    content, fault = _decompress(packed, compression)
+    content, fault = unpack(packed, compression, min(size, most))
     if fault:
         return content, fault
     if len(packed) < packed_size or len(content) < size:
@@ -160,44 +173,42 @@ def _unpack(chunk: bytes) -> tuple[bytes, str]:
     return content, ""
 
 
-def _decompress(packed: bytes, compression: str) -> tuple[bytes, str]:
-    """Return the content before the first fault, and the fault."""
-    if not compression:
-        return packed, ""
-    decompressors: dict[str, Any] = {"zstd": zstd.ZstdDecompressor, "lz4": LZ4FrameDecompressor}
-    if compression not in decompressors:
-        return b"", f"has the unknown compression {compression!r}"
-    decompressor, content = decompressors[compression](), bytearray()
-    for start in range(0, len(packed), SLICE):
-        try:
-            content += decompressor.decompress(packed[start : start + SLICE])
-        except (zstd.ZstdError, RuntimeError, EOFError) as error:
-            return bytes(content), f"cannot be decompressed: {error}"
-    return bytes(content), ""
-
-
-class _Fields:
-    """The fields of a record, one after the other."""
+class Fields:
+    """The fields of a record, one after the other; a `struct.error` says that one is cut off."""
 
     def __init__(self, content: bytes) -> None:
         self._content, self._position = content, 0
 
     def skip(self, size: int) -> None:
+        """Leave bytes out."""
         self._position += size
 
     def number(self, form: str) -> int:
+        """Return a number, by its form of `struct`."""
         value: int = struct.unpack_from(form, self._content, self._position)[0]
         self._position += struct.calcsize(form)
         return value
 
     def text(self) -> str:
+        """Return a text."""
         size = self.number("<I")
         start, self._position = self._position, self._position + size
         if self._position > len(self._content):
             raise struct.error("a text is longer than the record")
         return self._content[start : self._position].decode()
 
+    def counts(self) -> dict[int, int]:
+        """Return a mapping of channels to numbers."""
+        size = self.number("<I")
+        end = self._position + size
+        pairs = {}
+        while self._position < end:
+            key = self.number("<H")
+            pairs[key] = self.number("<Q")
+        return pairs
+
     def mapping(self) -> dict[str, str]:
+        """Return a mapping of texts."""
         size = self.number("<I")
         end = self._position + size
         pairs = {}
@@ -207,4 +218,5 @@ class _Fields:
         return pairs
 
     def rest(self) -> bytes:
+        """Return what follows."""
         return self._content[self._position :]
