@@ -55,7 +55,7 @@ class RecordProcess:
 
     def size(self):
         """Return how much of the recording is on the disk [B]."""
-        file = self.folder / f"{self.folder.name}.mcap"
+        file = self.folder / f"{self.folder.name}_0.mcap"
         return file.stat().st_size if file.exists() else 0
 
     def memory(self):

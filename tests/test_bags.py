@@ -15,8 +15,10 @@ from leg_msgs_py.recordings.bags import Bag
 from leg_msgs_py.recordings.definitions import message_definition
 from leg_msgs_py.recordings.errors import BagError
 from make_golden_bags import JOINT_STATE
+from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from sensor_msgs.msg import JointState
 
 BAGS = Path(__file__).parent / "bags"
 TRIPOD = BAGS / "hexapod_tripod"
@@ -281,6 +283,23 @@ def test_a_folder_without_recording_and_a_missing_one_are_told(tmp_path):
         Bag(tmp_path)
     with pytest.raises(BagError, match="does not exist"):
         Bag(tmp_path / "missing")
+
+
+@pytest.mark.parametrize("filled", list(itertools.product([0, 1, 3], repeat=4)))
+def test_messages_are_decoded_as_ros_serialises_them(tmp_path, filled):
+    names, *numbers = filled
+    message = JointState(name=["joint"] * names)
+    fields = ("position", "velocity", "effort")
+    for field, count in zip(fields, numbers, strict=True):
+        setattr(message, field, [1.0] * count)
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic("/joint_states", JOINT_STATE)
+        writer.write("/joint_states", 1, serialize_message(message))
+    bag = Bag(tmp_path / "bag")
+    (found,) = map(bag.decode, bag.messages())
+    assert found.name == message.name
+    for field, count in zip(fields, numbers, strict=True):
+        np.testing.assert_array_equal(getattr(found, field), [1.0] * count)
 
 
 def test_garbage_in_a_message_is_told_and_the_next_one_is_read():

@@ -2,6 +2,7 @@
 """Recordings of live topics: complete, standard, safe from kills and full disks."""
 
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -66,11 +67,11 @@ def test_a_recording_names_types_hashes_and_qos_as_rosbag2_does(tmp_path):
     information = YAML(typ="safe").load(tmp_path / "walk" / "metadata.yaml")
     information = information["rosbag2_bagfile_information"]
     assert (information["version"], information["storage_identifier"]) == (9, "mcap")
-    assert information["relative_file_paths"] == ["walk.mcap"]
+    assert information["relative_file_paths"] == ["walk_0.mcap"]
     (topic,) = information["topics_with_message_count"]
     assert topic["topic_metadata"]["type_description_hash"] == connection.digest
     assert topic["topic_metadata"]["offered_qos_profiles"][0]["reliability"] == "best_effort"
-    content = (tmp_path / "walk" / "walk.mcap").read_bytes()
+    content = (tmp_path / "walk" / "walk_0.mcap").read_bytes()
     assert b"topic_type_hash" in content  # of the channel, for readers without metadata.yaml
 
 
@@ -233,6 +234,17 @@ def test_what_is_recorded_is_on_the_disk_in_less_than_a_second(tmp_path, monkeyp
         wait_for(lambda: counts(tmp_path / "walk")["/text"] == 1)
 
 
+def test_a_recording_that_someone_removes_ends_with_a_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(durable_bag, "FLUSH_PERIOD", 0.1)
+    bag = DurableBag(tmp_path / "walk").__enter__()
+    bag.put(bag.add_topic("/text", STRING, []), 1, TEXT)
+    shutil.rmtree(tmp_path / "walk")
+    wait_for(lambda: bag.failure)
+    assert bag.size == 0
+    with pytest.raises(RecorderError, match="No such file or directory; nothing is kept"):
+        bag.__exit__()
+
+
 def test_a_kill_loses_nothing_that_is_on_the_disk(tmp_path):
     folder = tmp_path / "walk"
     with recording_legs(tmp_path) as record, sender(500.0, 2.0, LEGS[:1]) as sending:
@@ -241,7 +253,7 @@ def test_a_kill_loses_nothing_that_is_on_the_disk(tmp_path):
         record.stop(signal.SIGKILL)
         report_of(sending)
     bag = Bag(folder)
-    assert bag.damages.keys() == {"walk.mcap"}
+    assert bag.damages.keys() == {"walk_0.mcap"}
     found = list(bag.messages())
     assert found[: len(kept)] == kept
     assert [message.time for message in found] == sorted(message.time for message in found)

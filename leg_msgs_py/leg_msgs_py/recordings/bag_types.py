@@ -6,8 +6,10 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from typing import Any
 
+import numpy as np
 from leg_msgs_py.recordings.bag_files import Topic
 from leg_msgs_py.recordings.definitions import (
     SEPARATOR,
@@ -17,6 +19,7 @@ from leg_msgs_py.recordings.definitions import (
 )
 from leg_msgs_py.recordings.errors import BagError, UnknownTypeError
 from rosbags.interfaces import MessageDefinitionFormat, Nodetype
+from rosbags.serde import SerdeError
 from rosbags.typesys import (
     Stores,
     TypesysError,
@@ -26,6 +29,7 @@ from rosbags.typesys import (
 )
 from rosbags.typesys.store import Typestore
 
+PADDING = 8
 MOST_CHARACTERS = 2**20  # of all definitions of a recording
 MOST_FIELDS = 2000  # of a type with all the types of its fields
 MOST_ELEMENTS = 10**6  # of a field of fixed size
@@ -55,6 +59,34 @@ def installed_types(names: Iterable[str]) -> Typestore:
     for name in names:
         types.register(_types_of_text(message_definition(name).text, name))
     return types
+
+
+def decoded(types: Typestore, data: bytes, name: str) -> Any:
+    """Return a message of a type, serialised by whichever library.
+
+    The one of ROS leaves up to `PADDING` bytes more at the end for every list that is empty.
+
+    Raises:
+        Exception: Of any type, if the content does not fit the type.
+    """
+    try:
+        return types.deserialize_cdr(data, name)
+    except SerdeError:
+        kind = types.get_msgdef(name)
+        decode = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
+        message, end = decode(data[4:], 0, kind.cls, types)
+        if len(data) - 4 - end > PADDING * _empty_lists(message):
+            raise
+        return message
+
+
+def _empty_lists(part: Any) -> int:
+    """Return how many lists of a message are empty."""
+    if is_dataclass(part):
+        return sum(_empty_lists(getattr(part, field.name)) for field in fields(part))
+    if isinstance(part, list) and part:
+        return sum(map(_empty_lists, part))
+    return int(isinstance(part, (list, np.ndarray)) and not len(part))
 
 
 def bag_types(topics: Collection[Topic]) -> tuple[Typestore, dict[str, str]]:
@@ -90,7 +122,8 @@ def _refused_types(topics: Iterable[Topic]) -> dict[str, str]:
 
     It takes a fifth of a millisecond for a line, and what decodes a field is compiled.
     """
-    refused, characters = {}, 0
+    refused: dict[str, str] = {}
+    characters = 0
     for definition, topic in {topic.definition: topic for topic in topics}.items():
         sizes = [int(size or 0) for size in FIELD.findall(definition.data)]
         characters += len(definition.data)

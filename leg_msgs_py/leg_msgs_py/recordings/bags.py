@@ -26,7 +26,7 @@ from leg_msgs_py.recordings.bag_files import (
     open_file,
     plain_file,
 )
-from leg_msgs_py.recordings.bag_types import bag_types
+from leg_msgs_py.recordings.bag_types import bag_types, decoded
 from leg_msgs_py.recordings.errors import BagError
 from leg_msgs_py.recordings.unpacking import unpack_message
 from rosbags.interfaces import MessageDefinitionFormat
@@ -132,7 +132,7 @@ class Bag:
             reason = self._refused.get(message.type, "it is defined neither there nor here")
             raise BagError(f"{message.topic}: the type {message.type!r} is not known: {reason}")
         try:
-            return self.types.deserialize_cdr(message.data, message.type)
+            return decoded(self.types, message.data, message.type)
         except Exception as error:  # the decoders are generated, and garbage takes any way out
             raise BagError(f"{message.topic}: no {message.type}: {error}") from None
 

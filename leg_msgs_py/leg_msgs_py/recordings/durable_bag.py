@@ -29,7 +29,7 @@ from typing import cast
 from leg_msgs_py.recordings.definitions import Definition, message_definition
 from leg_msgs_py.recordings.errors import RecorderError
 from rosbags.interfaces import Connection, Qos
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.rosbag2.storage_mcap import Channel, McapWriter, write_channel, write_string
 
@@ -38,6 +38,11 @@ FLUSH_PERIOD = 0.5  # half of what may be lost, so that the disk has the other h
 QUEUE_SIZE = 128 * 2**20  # what may wait for a slow disk [B]
 MESSAGE_OVERHEAD = 150  # of a waiting message in memory, beside its data [B]
 LEAST_FREE = 64 * 2**20  # left on the disk, so that the index can still be written [B]
+
+
+def file_of(recording: Path) -> Path:
+    """Return the file of a recording; rosbag2 reindexes only those with a number in their name."""
+    return recording / f"{recording.name}_0.mcap"
 
 
 @dataclass(eq=False)
@@ -114,7 +119,9 @@ class DurableBag:
     @property
     def size(self) -> int:
         """What the file of the recording takes on the disk [B]."""
-        return (self.path / f"{self.path.name}.mcap").stat().st_size
+        with suppress(FileNotFoundError):  # someone has removed it
+            return file_of(self.path).stat().st_size
+        return 0
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos]) -> RecordedTopic:
         """Declare a topic; it enters the file with its first message.
@@ -158,8 +165,9 @@ class DurableBag:
                 self._fail(RecorderError(f"{error}; what was recorded is whole"))
             self._writer.close()
         except OSError as error:
-            reason = f"cannot write {self.path}: {error.strerror}; all but the last second is kept"
-            self._fail(RecorderError(f"{reason}, without an index"))
+            kept = "all but the last second is kept, without an index"
+            kept = kept if self.size else "nothing is kept"
+            self._fail(RecorderError(f"cannot write {self.path}: {error.strerror}; {kept}"))
         except Exception as error:
             self._fail(error)
         finally:
@@ -216,7 +224,11 @@ class _DiskFullError(Exception):
 
 
 class _Storage(McapWriter):
-    """An mcap file that can be flushed, and that names the hashes of types as rosbag2 does."""
+    """An mcap file that can be flushed, and that names hashes and itself as rosbag2 does."""
+
+    def __init__(self, path: Path, compression: CompressionMode) -> None:
+        super().__init__(path, compression)
+        self.path = self.path.rename(file_of(path))
 
     def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
         """Write a channel."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import math
 import signal
 import sys
@@ -37,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code: 0 also when a signal ended the recording."""
     command_line = sys.argv if arguments is None else ["record", *arguments]
     options = _parser().parse_args(remove_ros_args(command_line)[1:])
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names that a terminal cannot show
     try:
         _check(options)
         rclpy.init(args=command_line, signal_handler_options=SignalHandlerOptions.NO)

@@ -16,7 +16,7 @@ from tqdm import tqdm
 from leg_kinematics.description import load_leg_types, load_robot
 from leg_kinematics.errors import LegError, UnknownNameError, ValueRangeError
 from leg_kinematics.robot import Leg
-from leg_statics.commands.command_line import ArgumentParser
+from leg_statics.commands.command_line import ArgumentParser, print_on_any_terminal
 from leg_statics.commands.leg_pictures import (
     MAP_RESOLUTION,
     capacity_picture,
@@ -231,6 +231,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = make_parser()
     options = parser.parse_args(arguments)
+    print_on_any_terminal()
     try:
         for path in _run(options):
             print(path)

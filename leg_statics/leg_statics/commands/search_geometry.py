@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from leg_kinematics.documents import shared_files
 from leg_kinematics.errors import LegError
+from leg_statics.commands.command_line import print_on_any_terminal
 from leg_statics.design.search.geometry_search import GeometrySearch
 from leg_statics.design.search.study import Study
 from leg_statics.design.search.study_file import load_study
@@ -82,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0, or 130 if Ctrl-C stopped it. Mistakes and faults end with exit code 1 and a message.
     """
     options = make_parser().parse_args(arguments)
+    print_on_any_terminal()
     for number in (signal.SIGINT, signal.SIGTERM):  # a shell's `&` leaves SIGINT ignored
         signal.signal(number, signal.default_int_handler)
     try:

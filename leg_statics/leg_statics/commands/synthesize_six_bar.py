@@ -16,6 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from leg_kinematics.errors import LegError, ValueRangeError
+from leg_statics.commands.command_line import print_on_any_terminal
 from leg_statics.commands.six_bar_pictures import gait_curves, six_bar_pictures
 from leg_statics.design.synthesis import (
     PAPER_PHI_MAX,
@@ -33,9 +34,10 @@ from leg_statics.drawing.style import write_figure
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     options = _parser().parse_args(arguments)
+    print_on_any_terminal()
     try:
         return _run(options)
-    except LegError as error:
+    except (LegError, OSError) as error:
         print(f"synthesize_six_bar: {error}", file=sys.stderr)
         return 1
 
@@ -67,6 +69,12 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueRangeError(f"--crank-length must be > 0 mm, got {options.crank_length}")
     if options.samples < 2:
         raise ValueRangeError(f"--samples must be >= 2, got {options.samples}")
+    if not 0 <= options.seed < 2**32:
+        raise ValueRangeError(f"--seed must be from 0 to {2**32 - 1}, got {options.seed}")
+    if options.generations < 1:
+        raise ValueRangeError(f"--generations must be >= 1, got {options.generations}")
+    if options.figures:
+        options.figures.mkdir(parents=True, exist_ok=True)  # before the work, not after it
     optimum = synthesize(math.radians(options.phi_max))
     with tqdm(total=options.generations, desc="direct search", unit="generation") as bar:
 

@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from leg_kinematics.description import load_robot
 from leg_kinematics.errors import LegError, ValueRangeError
-from leg_statics.commands.command_line import ArgumentParser
+from leg_statics.commands.command_line import ArgumentParser, print_on_any_terminal
 from leg_statics.grounds import Grounds, load_grounds
 from leg_statics.recordings import report, tables
 from leg_statics.recordings.bag_judge import BagJudge, Topics
@@ -180,6 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for in a wrong way ends with exit code 2.
     """
     options = make_parser().parse_args(arguments)
+    print_on_any_terminal()
     try:
         for path in _run(options):
             print(path)

@@ -13,6 +13,7 @@ import fcntl
 import io
 import os
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError
 
-TAIL = 1 << 16  # bytes, longer than any line
+LONGEST_LINE = 1 << 16  # bytes
 
 
 class TableError(LegError):
@@ -111,7 +112,8 @@ class DesignTable:
         """
         end, count = self._size, len(self._parameters)
         with self.path.open("rb") as file:
-            for number, line in enumerate(file, start=1):
+            lines = iter(partial(file.readline, LONGEST_LINE), b"")
+            for number, line in enumerate(lines, start=1):
                 fields = next(csv.reader([line.decode("utf-8", "replace")]), [])
                 try:
                     if number == 1:
@@ -140,8 +142,12 @@ class DesignTable:
 
     def _drop_torn_line(self) -> None:
         size = os.fstat(self._file.fileno()).st_size
-        self._file.seek(max(0, size - TAIL))
-        tail = self._file.read(TAIL)
+        self._file.seek(max(0, size - LONGEST_LINE))
+        tail = self._file.read(LONGEST_LINE)
+        if size > len(tail) and b"\n" not in tail:
+            raise TableError(
+                f"{self.path}: damaged: its last line has more than {LONGEST_LINE} bytes"
+            )
         self._size = size - len(tail) + tail.rfind(b"\n") + 1
         self._file.truncate(self._size)
 
