@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands as a shell runs them: a clear line instead of a traceback, on any terminal."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings that are made to do harm, or broken by one bit: read in bounds, and told."""
 
 import os

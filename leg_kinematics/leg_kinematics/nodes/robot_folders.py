@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which robot descriptions a node reads for others: shipped ones, and those in certain folders.
 
 Whoever is in the network may name a robot. Without these bounds a node would tell them, by its

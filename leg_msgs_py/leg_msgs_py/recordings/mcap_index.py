@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read an MCAP file by its index, which tells what is in it and where."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decompression that ends, whatever comes out: a small file can hold terabytes of zeros.
 
 What is allowed is far beyond what sensors yield: messages of robots shrink to a tenth, maps of
