@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from leg_msgs.msg import LegStates, PointStatus
+from leg_msgs_py.losses import subscribe_raw
 from nodes_support import set_parameter, wait_for
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from leg_statics.capacity.problem import load_capacity
@@ -34,24 +34,19 @@ class Stream:
         self.node = node
         self.publisher = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
         self.subscriptions = [
-            node.create_subscription(
-                LegStates,
-                "/statics/leg_states",
-                self.receive,
-                DEEP,
-                event_callbacks=SubscriptionEventCallbacks(message_lost=self.lose),
-            ),
+            subscribe_raw(node, LegStates, "/statics/leg_states", self.receive, self.lose, DEEP),
             node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnose, 10),
         ]
         wait_for(lambda: self.publisher.get_subscription_count() >= 2)  # statics and maps
         wait_for(lambda: self.subscriptions[0].get_publisher_count() == 1)
         wait_for(lambda: self.ask(["left_front_crank_1"]) is None and self.diagnostics)
 
-    def receive(self, message):
+    def receive(self, data):
+        message = deserialize_message(data, LegStates)
         self.states[message.header.stamp.sec] = message
 
-    def lose(self, event):
-        self.lost += event.total_count_change
+    def lose(self, count):
+        self.lost += count
 
     def diagnose(self, message):
         if message.status[0].name.startswith("/statics"):

@@ -6,18 +6,19 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from leg_msgs.msg import ErrorCode
+from leg_msgs_py.losses import subscribe_raw
 from rcl_interfaces.msg import (  # type: ignore[import-untyped]
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -244,17 +245,9 @@ class RobotNode(Node):
                 except Exception as error:
                     self.failure(topic, error)
 
-        def lose(event: Any) -> None:
-            self.health.drop(topic, "lost by the middleware", event.total_count_change)
-
-        self.create_subscription(
-            message_type,
-            topic,
-            take,
-            STREAM_QOS,
-            raw=True,  # messages that are left out shall cost nothing
-            event_callbacks=SubscriptionEventCallbacks(message_lost=lose),
-        )
+        lose = partial(self.health.drop, topic, "lost by the middleware")
+        # undecoded: messages that are left out shall cost nothing
+        subscribe_raw(self, message_type, topic, take, lose, STREAM_QOS)
 
     def header(self, frame_id: str) -> Header:
         """Return a header with the present time."""

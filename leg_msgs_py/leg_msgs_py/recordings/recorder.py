@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from leg_msgs_py.losses import subscribe_raw
 from leg_msgs_py.recordings.definitions import message_class
 from leg_msgs_py.recordings.durable_bag import DurableBag, RecordedTopic
 from leg_msgs_py.recordings.errors import UnknownTypeError
@@ -98,27 +99,27 @@ class Recorder(Node):
     def _subscribe(self, topic: str, type_name: str, offered: Sequence[QoSProfile]) -> None:
         message_type = message_class(type_name)
         recorded = self._bag.add_topic(topic, type_name, [recorded_qos(qos) for qos in offered])
-        self.create_subscription(
+        subscribe_raw(
+            self,
             message_type,
             topic,
             partial(self._receive, recorded),
+            partial(self._note_loss, topic),
             matching_qos(offered),
             event_callbacks=SubscriptionEventCallbacks(
-                message_lost=partial(self._note_loss, topic),
                 incompatible_qos=lambda _: self._remark(
                     f"{topic}: a publisher that came later offers less than the first ones (best "
                     "effort, or volatile); its messages are not recorded"
                 ),
             ),
-            raw=True,
         )
         self.get_logger().info(f"recording {topic} ({type_name})")
 
     def _receive(self, topic: RecordedTopic, data: bytes) -> None:
         self._bag.put(topic, time.time_ns(), data)
 
-    def _note_loss(self, topic: str, event: Any) -> None:
-        self.lost[topic] = event.total_count
+    def _note_loss(self, topic: str, count: int) -> None:
+        self.lost[topic] += count
 
     def _remark(self, text: str) -> None:
         if text not in self.remarks:
