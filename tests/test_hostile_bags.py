@@ -4,6 +4,7 @@
 import os
 import struct
 import tracemalloc
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,6 @@ from leg_msgs_py.recordings.unpacking import LARGEST, most_unpacked
 MEGABYTE = 2**20
 ZEROS = zstd.compress(bytes(64 * MEGABYTE))  # some kilobytes
 STRING = b"\0\1\0\0\6\0\0\0hello\0"
-HELLO = "hello"
 
 
 def text(value: str | bytes) -> bytes:
@@ -188,9 +188,6 @@ def small(tmp_path_factory):
     return (folder / "walk.mcap").read_bytes()
 
 
-MOST_MEMORY = 2**31
-
-
 @pytest.mark.parametrize("part", range(8))
 def test_one_flipped_bit_costs_messages_and_nothing_else(tmp_path, small, part):
     file = tmp_path / "walk.mcap"
@@ -205,7 +202,5 @@ def test_one_flipped_bit_costs_messages_and_nothing_else(tmp_path, small, part):
         found = list(bag.messages())
         assert len(found) <= 5
         for each in found:
-            try:
+            with suppress(BagError):  # and nothing else
                 bag.decode(each)
-            except BagError as error:
-                print(error)
