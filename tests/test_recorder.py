@@ -173,13 +173,18 @@ def recording_legs(folder):
     return RecordProcess(folder / "walk", "--topics", "/leg_*", "/diagnostics")
 
 
+def lost_by_topic(output):
+    """Return how many messages of a topic the command says that the middleware lost."""
+    told = re.findall(r"(/\S+) .*\n +(\d+) lost by the middleware", output)
+    return {topic: int(count) for topic, count in told}
+
+
 def assert_recorded_or_counted(folder, sent, published, output):
     """Check that what is not recorded is counted as lost, and nothing else.
 
     On a busy machine the middleware loses some; that it loses none otherwise shows `make soak`.
     """
-    told = re.findall(r"(/\S+) .*\n +(\d+) lost by the middleware", output)
-    lost = {topic: int(count) for topic, count in told}
+    lost = lost_by_topic(output)
     recorded, lacking = counts(folder), missing(folder, sent)
     for topic in LEGS:
         *_, count = lacking.get(topic, (0,))
@@ -282,7 +287,7 @@ def test_what_the_middleware_loses_is_counted(tmp_path, node):
         output = record.stop()
     node.destroy_publisher(publisher)
     (found,) = numbers(folder).values()
-    (lost,) = map(int, re.findall(r"(\d+) lost by the middleware", output))
+    lost = lost_by_topic(output)[LEGS[0]]
     lacking = len({*range(min(found), max(found))} - {*found})
     assert 0 < lacking <= lost <= message.header.stamp.sec - len(found)
 
