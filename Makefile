@@ -22,8 +22,8 @@ demo: setup  ## Show what the suite answers, on the example robots
 run: setup  ## Start the nodes of one robot
 	$(VENV_PYTHON) tools/run_robot.py
 
-test: lint typecheck  ## Check style and types, then run every test
-	$(VENV_PYTHON) -m pytest
+test: lint typecheck  ## Check style and types, then run every test, two at a time
+	$(VENV_PYTHON) -m pytest -n 2 --dist loadfile
 
 lint: setup  ## Check style and format
 	$(VENV_PYTHON) -m ruff check

@@ -10,7 +10,7 @@ import pytest
 
 from leg_kinematics import GeometryError, ParallelDrive, Status
 from leg_kinematics.kernels.settled import UNCERTAIN
-from leg_kinematics.mechanisms.parallel_drive import _forward, _forward_search
+from leg_kinematics.mechanisms.parallel_drive_kernels import forward, forward_search
 from leg_kinematics.mechanisms.walking_axes import walking_vectors
 from leg_kinematics.mirrored import Mirrored
 
@@ -105,9 +105,9 @@ def test_steps_of_a_block_find_what_a_search_for_each_point_finds(reach, most):
     q = np.random.default_rng(4).uniform(-reach, reach, (4000, 3))
     for mode in reversed(INITIAL.assembly_modes):  # the initial one last
         parameters = INITIAL._parameters(mode)
-        coordinates, status = _forward(parameters, q)
+        coordinates, status = forward(parameters, q)
         sure = status != UNCERTAIN
-        searched, expected = _forward_search(parameters, q[sure])
+        searched, expected = forward_search(parameters, q[sure])
         np.testing.assert_array_equal(status[sure], expected)
         np.testing.assert_allclose(coordinates[sure], searched, rtol=0.0, atol=1e-12)
     assert np.mean(sure) > most

@@ -46,6 +46,7 @@ from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.status import Status
@@ -312,13 +313,13 @@ def _forward(geometry, signs, rest, limits, passive_limits, q, foot, closure, st
     status[0] = status_of_point(g, branch, rest, limits, passive_limits, q, closure)
 
 
-@kernel("(g),(n),(k)->(k,k)", "f8[:], f8[:], f8[:], f8[:,:]")
-def _planar_jacobian(geometry, closure, shape, jacobian):  # type: ignore[no-untyped-def]
-    """Equation (19); `shape` only sets the size of the result."""
+@points_kernel("(g),(points,3)->(points,2,2)", "f8 f8 f8")
+def _planar_jacobian(geometry, closure, jacobian):  # type: ignore[no-untyped-def]
+    """Equation (19)."""
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    (jacobian[0, 0], jacobian[0, 1], jacobian[1, 0], jacobian[1, 1]) = planar_rates(
-        g, closure[0], closure[1]
-    )
+    for i in range(len(closure)):
+        rates = planar_rates(g, closure[i, 0], closure[i, 1])
+        (jacobian[i, 0, 0], jacobian[i, 0, 1], jacobian[i, 1, 0], jacobian[i, 1, 1]) = rates
 
 
 @kernel("(g),(n)->(n,n)", "f8[:], f8[:], f8[:,:]")
@@ -569,7 +570,7 @@ class DoubleRhombus(Dimensioned):
         Rows are the foot's velocity along the walking direction (paper's X) and up in the swung
         plane (paper's Z), columns the speeds of the upper and lower cylinder.
         """
-        return _planar_jacobian(self._geometry, posture.closure, np.zeros(2))
+        return _planar_jacobian(self._geometry, posture.closure)
 
     def jacobian(self, posture: Posture) -> FloatArray:
         """J of the foot's velocity, v = J q' (..., 3, 3) [1]; (19) and the side swing."""

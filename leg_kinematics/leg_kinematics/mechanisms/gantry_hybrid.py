@@ -46,6 +46,7 @@ from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
@@ -299,49 +300,69 @@ def all_finite(vector: FloatArray) -> bool:
 # --------------------------------------------------------------------------- kernels
 
 
-@kernel(
-    "(g),(b),(p),(n,k),(p,k),(n),(c)->(n),(c),()",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
-)
-def _inverse(geometry, signs, rest, limits, passive_limits, task, shape, q, closure, status):  # type: ignore[no-untyped-def]
-    """Platform position to slides and closure."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    branch = Branch(*to_fixed_tuple(signs, 5))
-    q[:] = math.nan
-    closure[:] = math.nan
-    if not all_finite(task):
-        status[0] = INVALID_INPUT
-        return
+@scalar
+def solve_platform(
+    g: Geometry, branch: Branch, task: FloatArray, q: FloatArray, closure: FloatArray
+) -> bool:
+    """Fill slides and closure of a platform position; return whether it is within reach."""
     x, y, z, beta = task[0], task[1], task[2], wrapped(task[3])
     s1, s3, s4 = slides(g, branch, x, z, beta)
     if not math.isfinite(s1 + s3 + s4):
-        status[0] = UNREACHABLE
-        return
+        return False
     q[0], q[1], q[2], q[3] = s1, y, s3, s4
     closure[0], closure[1], closure[2] = x, z, beta
-    status[0] = status_of_point(g, branch, rest, limits, passive_limits, q, closure)
+    return True
 
 
-@kernel(
-    "(g),(b),(p),(n,k),(p,k),(n),(c)->(n),(c),()",
-    "f8[:], f8[:], f8[:], f8[:,:], f8[:,:], f8[:], f8[:], f8[:], f8[:], u1[:]",
+@scalar
+def solve_slides(
+    g: Geometry, branch: Branch, q: FloatArray, task: FloatArray, closure: FloatArray
+) -> bool:
+    """Fill platform position and closure of slides; return whether the bars reach."""
+    x, z, beta = platform(g, branch, q[0], q[2], q[3])
+    if not math.isfinite(x + z + beta):
+        return False
+    task[0], task[1], task[2], task[3] = x, q[1], z, beta
+    closure[0], closure[1], closure[2] = x, z, beta
+    return True
+
+
+@points_kernel(
+    "(g),(b),(p),(4,2),(p,2),(points,4)->(points,4),(points,3),(points)",
+    "f8 f8 f8 f8 f8 f8 f8 f8 u1",
 )
-def _forward(geometry, signs, rest, limits, passive_limits, q, shape, task, closure, status):  # type: ignore[no-untyped-def]
+def _inverse(geometry, signs, rest, limits, passive_limits, task, q, closure, status):  # type: ignore[no-untyped-def]
+    """Platform position to slides and closure."""
+    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
+    branch = Branch(*to_fixed_tuple(signs, 5))
+    for i in range(len(task)):
+        q[i] = math.nan
+        closure[i] = math.nan
+        if not all_finite(task[i]):
+            status[i] = INVALID_INPUT
+        elif not solve_platform(g, branch, task[i], q[i], closure[i]):
+            status[i] = UNREACHABLE
+        else:
+            status[i] = status_of_point(g, branch, rest, limits, passive_limits, q[i], closure[i])
+
+
+@points_kernel(
+    "(g),(b),(p),(4,2),(p,2),(points,4)->(points,4),(points,3),(points)",
+    "f8 f8 f8 f8 f8 f8 f8 f8 u1",
+)
+def _forward(geometry, signs, rest, limits, passive_limits, q, task, closure, status):  # type: ignore[no-untyped-def]
     """Slides to platform position and closure."""
     g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
     branch = Branch(*to_fixed_tuple(signs, 5))
-    task[:] = math.nan
-    closure[:] = math.nan
-    if not all_finite(q):
-        status[0] = INVALID_INPUT
-        return
-    x, z, beta = platform(g, branch, q[0], q[2], q[3])
-    if not math.isfinite(x + z + beta):
-        status[0] = UNREACHABLE
-        return
-    task[0], task[1], task[2], task[3] = x, q[1], z, beta
-    closure[0], closure[1], closure[2] = x, z, beta
-    status[0] = status_of_point(g, branch, rest, limits, passive_limits, q, closure)
+    for i in range(len(q)):
+        task[i] = math.nan
+        closure[i] = math.nan
+        if not all_finite(q[i]):
+            status[i] = INVALID_INPUT
+        elif not solve_slides(g, branch, q[i], task[i], closure[i]):
+            status[i] = UNREACHABLE
+        else:
+            status[i] = status_of_point(g, branch, rest, limits, passive_limits, q[i], closure[i])
 
 
 @kernel("(g),(n),(c)->(n,n)", "f8[:], f8[:], f8[:], f8[:,:]")
@@ -427,13 +448,6 @@ def _excursions(geometry, q, closure, rest, excursions):  # type: ignore[no-unty
     passive_state(g, levers(g, q, closure), closure, state)
     for joint in range(PASSIVE_COUNT):
         excursions[joint] = excursion(state, rest, joint)
-
-
-@kernel("(g),(n),(c),(l)->(l)", "f8[:], f8[:], f8[:], f8[:], f8[:]")
-def _levers(geometry, q, closure, shape, result):  # type: ignore[no-untyped-def]
-    """Components of the bars in the order of `Levers`."""
-    g = Geometry(*to_fixed_tuple(geometry, GEOMETRY_SIZE))
-    (result[0], result[1], result[2], result[3], result[4], result[5]) = levers(g, q, closure)
 
 
 # --------------------------------------------------------------------------- mechanism
@@ -532,16 +546,13 @@ class GantryHybrid(Dimensioned):
         any_rest = np.zeros(PASSIVE_COUNT)
         limits = (self.joint_limits, self.passive_joint_limits)
         signs = np.ones(len(Branch._fields))
-        closure: FloatArray = _forward(
-            self._geometry, signs, any_rest, *limits, np.zeros(4), np.zeros(3)
-        )[1]
+        closure: FloatArray = _forward(self._geometry, signs, any_rest, *limits, np.zeros(4))[1]
         return closure
 
     @cached_property
     def _signs(self) -> FloatArray:
         """Branch signs of the initial posture; 0 where it is singular."""
-        zeros = np.zeros(len(Levers._fields))
-        v = Levers(*_levers(self._geometry, np.zeros(4), self._initial_closure, zeros))
+        v = levers(Geometry(*self._geometry), np.zeros(4), self._initial_closure)
         return np.array([1.0, 1.0, *np.sign([v.n1, v.n2, v.k])])
 
     @cached_property
@@ -581,7 +592,7 @@ class GantryHybrid(Dimensioned):
             The posture; NaN where the bars do not reach the platform.
         """
         q = as_array("joint_positions", joint_positions, 4)
-        task, closure, status = _forward(*self._parameters(assembly_mode), q, np.zeros(3))
+        task, closure, status = _forward(*self._parameters(assembly_mode), q)
         return Posture(q, closure, task, status)
 
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
@@ -598,7 +609,7 @@ class GantryHybrid(Dimensioned):
             The posture; NaN where the platform is out of reach.
         """
         task = as_array("foot_position", foot_position, 4)
-        q, closure, status = _inverse(*self._parameters(assembly_mode), task, np.zeros(3))
+        q, closure, status = _inverse(*self._parameters(assembly_mode), task)
         return Posture(q, closure, task, status)
 
     def jacobian(self, posture: Posture) -> FloatArray:

@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.kernels.kernel import kernel, scalar
+from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import wrapped
 
 
@@ -185,12 +186,12 @@ def _approximate(offsets, position, velocity, acceleration, drive, shape, motion
     put_motion(output(p, none, r, Jet(drive[0], drive[1], drive[2])), beta, motion)
 
 
-@kernel("(g),(t),(s)->(s)", "f8[:], f8[:], f8[:], f8[:]")
-def _state(offsets, position, shape, state):  # type: ignore[no-untyped-def]
+@points_kernel("(2),(points,4)->(points,3)", "f8 f8 f8")
+def _state(offsets, position, state):  # type: ignore[no-untyped-def]
     """Bends and length of the middle shaft."""
-    state[0], state[1], state[2] = shaft_state(
-        offsets[0], offsets[1], position[0], position[2], position[3]
-    )
+    for i in range(len(position)):
+        x, z, beta = position[i, 0], position[i, 2], position[i, 3]
+        state[i, 0], state[i, 1], state[i, 2] = shaft_state(offsets[0], offsets[1], x, z, beta)
 
 
 # --------------------------------------------------------------------------- chain
@@ -223,7 +224,7 @@ class AuxiliaryChain:
         return self._state(position)[..., 2]
 
     def _state(self, position: ArrayLike) -> FloatArray:
-        state: FloatArray = _state(self._offsets, as_array("position", position, 4), np.zeros(3))
+        state: FloatArray = _state(self._offsets, as_array("position", position, 4))
         return state
 
     def output_angle(self, position: ArrayLike, input_angle: ArrayLike) -> FloatArray:
