@@ -6,6 +6,7 @@ It needs no ROS, and must be called before anything loads it.
 
 from __future__ import annotations
 
+import atexit
 import os
 import socket
 
@@ -14,7 +15,7 @@ FIRST_PORT, PORTS = 7400, 250  # of domain 0, and of each domain, as the DDS sta
 CLAIM = 2  # a port of each domain that no participant takes
 PARTICIPANTS = range(10, 110, 2)  # the port that each participant of a domain takes
 
-_claims: list[socket.socket] = []  # the system gives them back when the process ends
+_claims: list[socket.socket] = []  # held as long as the process lives
 
 
 def claim_domain() -> str:
@@ -30,6 +31,7 @@ def claim_domain() -> str:
             continue
         if all(_is_free(first + port) for port in PARTICIPANTS):
             _claims.append(claim)
+            atexit.register(claim.close)  # or Python warns of it, after all that tests print
             return str(domain)
         claim.close()
     raise RuntimeError(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use")
