@@ -2,6 +2,7 @@
 
 VENV := $(CURDIR)/.venv
 VENV_PYTHON := $(VENV)/bin/python
+LOWEST := $(CURDIR)/.venv-lowest
 # The Python to make .venv with. Once it is there it stays with its Python, unless PYTHON names another.
 PYTHON ?= $(or $(wildcard $(VENV_PYTHON)),python3)
 
@@ -10,8 +11,11 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export AMENT_PREFIX_PATH := $(VENV)
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRITEBYTECODE
 
+# What `make run` starts.
+ROBOT ?= hexapod
+
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint typecheck soak bench bench-compare papers clean
+.PHONY: help setup demo run test test-lowest lint typecheck soak bench bench-compare papers clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -19,8 +23,9 @@ help:  ## Show this list
 demo: setup  ## Show what the suite answers, on the example robots
 	$(VENV_PYTHON) tools/demo.py
 
-run: setup  ## Start the nodes of one robot
-	$(VENV_PYTHON) tools/run_robot.py
+run: setup  ## Start the nodes of a robot: [ROBOT=hexapod] [NAMESPACE=] [GAIT=yes] [PARAMETERS="name:=value ..."]
+	$(VENV_PYTHON) tools/run_robot.py --robot "$(ROBOT)" --namespace "$(NAMESPACE)" \
+		$(if $(GAIT),--gait) $(PARAMETERS)
 
 test: lint typecheck  ## Check style and types, then run every test, two at a time
 	$(VENV_PYTHON) -m pytest -n 2 --dist loadfile
@@ -31,6 +36,17 @@ lint: setup  ## Check style and format
 
 typecheck: setup  ## Check types
 	$(VENV_PYTHON) -m mypy
+
+test-lowest: $(LOWEST)/COLCON_IGNORE  ## Run the libraries' tests with the oldest supported versions
+	PYTHONPATH=leg_kinematics:leg_statics:leg_msgs_py $(LOWEST)/bin/python -m pytest \
+		--ignore leg_statics/test/test_judge_findings.py leg_kinematics/test leg_statics/test
+
+# It needs no ROS, and judges no recordings, but a Python that matplotlib of Ubuntu 24.04 has wheels for: 3.10 or 3.11.
+$(LOWEST)/COLCON_IGNORE: requirements-lowest.txt
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		--require-hashes --requirement $<
+	touch $@
 
 soak: setup  ## Record a minute at 1 kHz for six legs and count what is lost
 	$(VENV_PYTHON) -m pytest -s tests/soak_recorder.py
@@ -48,8 +64,8 @@ papers: setup  ## Recompute the published tables and show them side by side
 	$(VENV_PYTHON) tools/papers.py
 
 clean:  ## Remove the environment and all caches
-	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-lowest .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-setup:
+setup:  ## Build the environment .venv, or bring it up to date; then ./leg runs commands in it
 	@$(PYTHON) tools/setup_workspace.py

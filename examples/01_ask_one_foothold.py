@@ -3,7 +3,7 @@
 
 Start the nodes with `make run`; then, in another terminal:
 
-    .venv/bin/python examples/01_ask_one_foothold.py
+    ./leg python examples/01_ask_one_foothold.py
 """
 
 import sys

@@ -3,7 +3,7 @@
 
 Start the nodes with `make run`; then, in another terminal:
 
-    .venv/bin/python examples/02_rank_ten_thousand.py
+    ./leg python examples/02_rank_ten_thousand.py
 """
 
 import sys

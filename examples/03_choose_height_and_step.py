@@ -3,7 +3,7 @@
 
 Start the nodes with `make run`; then, in another terminal:
 
-    .venv/bin/python examples/03_choose_height_and_step.py
+    ./leg python examples/03_choose_height_and_step.py
 """
 
 import sys

@@ -3,7 +3,7 @@
 
 Start the nodes with `make run`; then, in another terminal:
 
-    .venv/bin/python examples/04_walk_over_terrain.py
+    ./leg python examples/04_walk_over_terrain.py
 
 How it chooses is told in tripod_gait.py. Parameters, such as `--ros-args -p distance:=2.0`:
 `terrain` (YAML file), `distance` [m], `mass` [kg], `robot` (namespace of its nodes), `pause`

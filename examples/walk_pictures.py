@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,6 +15,8 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.patches import Rectangle
 from terrain import Patch, Terrain
 from tripod_gait import COLOURS, TRIPODS, HalfStep
+
+from leg_statics.drawing.style import outside_legend
 
 MARKERS = {
     "left_front": "^",
@@ -70,13 +73,7 @@ def plot_terrain(terrain: Terrain, half_steps: Sequence[HalfStep]) -> Figure:
     ax.set_xlabel("x [m], forward", fontsize=SMALL + 1)
     ax.set_ylabel("y [m], left", fontsize=SMALL + 1)
     ax.tick_params(labelsize=SMALL)
-    figure.legend(
-        handles=_legend(),
-        loc="outside upper center",
-        ncols=5,
-        fontsize=SMALL,
-        frameon=False,
-    )
+    _legend_outside(figure, _legend(), 5)
     return figure
 
 
@@ -132,14 +129,15 @@ def plot_steps(half_steps: Sequence[HalfStep], required_load: float) -> Figure:
         loc="lower left",
         bbox_to_anchor=(0, 1),
     )
-    figure.legend(
-        handles=[_leg_handle(leg) for leg in COLOURS],
-        loc="outside lower center",
-        ncols=6,
-        fontsize=SMALL,
-        frameon=False,
-    )
+    _legend_outside(figure, [_leg_handle(leg) for leg in COLOURS], 6, below=True)
     return figure
+
+
+def _legend_outside(
+    figure: Figure, handles: Sequence[Artist], columns: int, *, below: bool = False
+) -> None:
+    labels = [str(handle.get_label()) for handle in handles]
+    outside_legend(figure, handles, labels, columns, fontsize=SMALL, below=below)
 
 
 def _look(patch: Patch, level: float) -> tuple[str, str]:

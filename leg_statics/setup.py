@@ -22,6 +22,7 @@ setup(
     entry_points={
         "console_scripts": [
             "designs_node = leg_statics.nodes.entry_points:designs_node",
+            "gait_node = leg_statics.nodes.entry_points:gait_node",
             "judge_bag = leg_statics.recordings.judge_bag:main",
             "maps_node = leg_statics.nodes.entry_points:maps_node",
             "plot_index_map = leg_statics.commands.plot_index_map:main",

@@ -13,7 +13,6 @@ bits that differ from one processor to the next, and packs well.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.status import Status
 from leg_statics.efforts import joint_efforts
+from leg_statics.gait import foot_path, ground_reaction
 
 FOLDER = Path(__file__).resolve().parent.parent / "tests" / "bags"
 START = 1_700_000_000_000_000_000  # when the recordings begin [ns]
@@ -135,7 +135,7 @@ def sample_walk(walk: Walk) -> Sample:
     for group, legs in enumerate(walk.groups):
         phase = (times / walk.period + group / len(walk.groups)) % 1.0
         for name in legs:
-            forces[name] = _ground_reaction(phase, walk.weight / len(legs))
+            forces[name] = _rounded(ground_reaction(phase, walk.weight / len(legs)), FORCE_STEP)
             parts.append((robot.leg(name), _joints(robot.leg(name), walk, phase, forces[name])))
     parts.sort(key=lambda part: list(robot.legs).index(part[0].name))
     names = tuple(joint for leg, _ in parts for joint in leg.joint_names)
@@ -145,30 +145,10 @@ def sample_walk(walk: Walk) -> Sample:
 
 
 def _foot(walk: Walk, leg: Leg, phase: FloatArray) -> FloatArray:
-    """Return the foot in the leg frame (T, 3) [m]: a straight stance, then an arc forward."""
-    swing = 2.0 * phase - 1.0  # 0 to 1 in the second half
-    back = np.where(phase < 0.5, 0.5 - 2.0 * phase, -0.5 * np.cos(math.pi * swing))
-    rise = np.where(phase < 0.5, 0.0, np.sin(math.pi * swing) ** 2)
-    neutral = leg.mechanism.initial_posture.foot_position
-    return np.stack(
-        [
-            neutral[0] + walk.stride * back,
-            np.full_like(phase, neutral[1]),
-            walk.height + walk.lift * rise,
-        ],
-        axis=-1,
-    )
-
-
-def _ground_reaction(phase: FloatArray, load: float) -> FloatArray:
-    """Return the force on a foot (T, 3) [N]: it takes its load over and hands it on smoothly.
-
-    A little of it drives: braking at first, then pushing.
-    """
-    share = np.clip(np.minimum(phase, 0.5 - phase) / 0.05, 0.0, 1.0)
-    vertical = load * share
-    force = np.stack([0.1 * (4.0 * phase - 1.0) * vertical, np.zeros_like(phase), vertical], -1)
-    return _rounded(force, FORCE_STEP)
+    """Return the foot in the leg frame (T, 3) [m]."""
+    neutral = leg.mechanism.initial_posture.foot_position.copy()
+    neutral[2] = walk.height
+    return foot_path(neutral, phase, walk.stride, walk.lift)
 
 
 def _joints(leg: Leg, walk: Walk, phase: FloatArray, force: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ STOP_SIGNALS = ((signal.SIGINT, 6.0), (signal.SIGTERM, 3.0), (signal.SIGKILL, No
 
 def node_names() -> tuple[str, ...]:
     """Return the names of the nodes of a robot."""
-    return tuple(_read_nodes())
+    return tuple(node["name"] for node in YAML(typ="safe").load(NODES)["nodes"])
 
 
 def find_executable(package: str, executable: str) -> Path:
@@ -44,7 +44,7 @@ class NodeProcesses:
 
     Args:
         robot: YAML file or name of a shipped robot; None for the nodes' default.
-        names: Nodes to start; None for all.
+        names: Nodes to start, companions among them; None for all that a robot has.
         namespace: Namespace of the nodes; "" for none.
         environment: Variables that differ from this process's.
         parameters: Further parameters of every node.
@@ -117,4 +117,5 @@ class NodeProcesses:
 
 
 def _read_nodes() -> dict[str, dict[str, str]]:
-    return {node["name"]: node for node in YAML(typ="safe").load(NODES)["nodes"]}
+    known = YAML(typ="safe").load(NODES)
+    return {node["name"]: node for node in (*known["nodes"], *known["companions"])}

@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Time per point and memory by the number of points in a call."""
+"""Time per point and memory by the number of points in a call.
+
+    ./leg python benchmarks/entries/growth.py RESULT.json PICTURE.png
+
+draws the picture of a saved run.
+"""
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
 import numpy as np
-from harness import Row, Settings, Timing, measure, timed_row
+from harness import Row, Settings, measure, timed_row
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
 
 from leg_statics.capacity.problem import load_capacity
@@ -27,7 +36,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     lower, upper = leg.effort_limits.T
     few = reachable_positions(mechanism)
     counts = [10**k for k in range(settings.count(7, 5))]
-    times: dict[str, list[Timing]] = {}
+    times: dict[str, float] = {}
     for count in counts:
         feet = np.resize(few, (count, 3)) if count > BATCH else few[:count]
         jacobian = mechanism.inverse_with_twist(feet)[1][..., :3, :]
@@ -40,9 +49,10 @@ def rows(settings: Settings) -> Iterator[Row]:
             ),
         ):
             timing = measure(function, settings, count)
-            times.setdefault(name, []).append(timing)
-            yield timed_row(f"{name}, N = {count:,}", timing, note="per point")
-    draw(counts, times)
+            row = timed_row(f"{name}, N = {count:,}", timing, note="per point")
+            times[row.what] = row.value
+            yield row
+    draw(times, PICTURE)
 
     once, many = settings.count(1_000_000, 100_000), settings.count(10_000_000, 1_000_000)
     yield Row(
@@ -71,16 +81,32 @@ def memory(count: int, chunk: int) -> float:
     return float(answer.stdout)
 
 
-def draw(counts: list[int], times: dict[str, list[Timing]]) -> None:
-    """Save time per point by number of points as a picture."""
+def draw(times: Mapping[str, float], picture: Path) -> None:
+    """Save time per point by number of points as a picture.
+
+    Args:
+        times: Medians [s] by what the rows of a result call them: "inverse, N = 1,000".
+        picture: File to write.
+    """
     from matplotlib.figure import Figure
 
+    curves: dict[str, list[tuple[int, float]]] = {}
+    for what, seconds in times.items():
+        if found := re.fullmatch(r"(\w+), N = ([\d,]+)", what):
+            point = int(found[2].replace(",", "")), 1e6 * seconds
+            curves.setdefault(found[1], []).append(point)
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.add_subplot()
-    for name, timings in times.items():
-        axes.loglog(counts, [1e6 * t.median for t in timings], marker="o", label=name)
+    for name, points in curves.items():
+        axes.loglog(*zip(*points, strict=True), marker="o", label=name)
     axes.set(xlabel="points in one call", ylabel="time per point [µs]")
     axes.grid(which="both", alpha=0.3)
     axes.legend()
-    PICTURE.parent.mkdir(exist_ok=True)
-    figure.savefig(PICTURE, dpi=150)
+    picture.parent.mkdir(exist_ok=True)
+    figure.savefig(picture, dpi=150)
+
+
+if __name__ == "__main__":
+    result, picture = map(Path, sys.argv[1:])
+    entry = json.loads(result.read_text())["entries"]["growth"]
+    draw({row["what"]: row["value"] for row in entry}, picture)

@@ -2,10 +2,12 @@
 """Start the nodes of one robot: `ros2 launch leg_bringup leg_suite.launch.py robot:=hexapod`."""
 
 from pathlib import Path
+from typing import Any
 
 import yaml
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -15,7 +17,8 @@ NODES = Path(__file__).resolve().parent.parent / "nodes.yaml"
 
 def generate_launch_description() -> LaunchDescription:
     """Return the nodes of `nodes.yaml` with the robot and namespace asked for."""
-    robot = ParameterValue(LaunchConfiguration("robot"), value_type=str)
+    known = yaml.safe_load(NODES.read_text())
+    companions = [node["name"] for node in known["companions"]]
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -25,15 +28,28 @@ def generate_launch_description() -> LaunchDescription:
                 "namespace", default_value="", description="Namespace of the robot's nodes"
             ),
             *(
-                Node(
-                    package=node["package"],
-                    executable=node["executable"],
-                    name=node["name"],
-                    namespace=LaunchConfiguration("namespace"),
-                    parameters=[{"robot": robot}],
-                    output="screen",
+                DeclareLaunchArgument(
+                    name, default_value="false", description=f"Whether to start the {name} node"
                 )
-                for node in yaml.safe_load(NODES.read_text())["nodes"]
+                for name in companions
+            ),
+            *(_node(node) for node in known["nodes"]),
+            *(
+                _node(node, condition=IfCondition(LaunchConfiguration(node["name"])))
+                for node in known["companions"]
             ),
         ]
+    )
+
+
+def _node(node: dict[str, str], **options: Any) -> Node:
+    robot = ParameterValue(LaunchConfiguration("robot"), value_type=str)
+    return Node(
+        package=node["package"],
+        executable=node["executable"],
+        name=node["name"],
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[{"robot": robot}],
+        output="screen",
+        **options,
     )

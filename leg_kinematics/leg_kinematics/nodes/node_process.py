@@ -19,6 +19,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from leg_kinematics.errors import LegError
+from leg_kinematics.nodes.node_help import asks_for_help
 from leg_kinematics.nodes.robot_node import RobotNode
 
 STOP_TIMEOUT = 5.0  # a callback may take this long to end when the node stops [s]
@@ -47,6 +48,8 @@ def run(make_node: Callable[[], RobotNode]) -> int:
     """
     try:
         _handle_signals(_interrupt)
+        if asks_for_help(make_node, sys.argv):
+            return 0
         return _spin_until_signal(make_node)
     except KeyboardInterrupt:
         return 0

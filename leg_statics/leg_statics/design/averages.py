@@ -189,5 +189,5 @@ def _sequences(dimensions: int, length: int, seed: int) -> FloatArray:
     seeds = np.random.SeedSequence(seed).spawn(SEQUENCES)
     power = math.ceil(math.log2(length))
     return np.stack(
-        [qmc.Sobol(dimensions, rng=np.random.default_rng(s)).random_base2(power) for s in seeds]
+        [qmc.Sobol(dimensions, seed=np.random.default_rng(s)).random_base2(power) for s in seeds]
     )

@@ -335,10 +335,10 @@ def search(
     def rms(x: FloatArray) -> FloatArray:
         return np.nan_to_num(fit(Design(*x)).rms, nan=math.pi)
 
-    def report(intermediate_result: object) -> bool:
+    def report(x: FloatArray, convergence: float) -> bool:
         nonlocal done
         done += 1
-        best = float(intermediate_result.fun)  # type: ignore[attr-defined]
+        best = float(rms(x))
         return bool(callback and callback(SearchProgress(done, generations, best)))
 
     def deviations(x: FloatArray) -> FloatArray:
@@ -347,7 +347,7 @@ def search(
     found = differential_evolution(
         rms,
         SEARCH_BOUNDS,
-        rng=seed,
+        seed=np.random.default_rng(seed),
         maxiter=generations,
         popsize=population,
         vectorized=True,

@@ -8,7 +8,8 @@ colour alone: maps have contour lines, curves have line styles. Lengths are in m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -92,17 +93,44 @@ def with_legend(figure: Figure, ax: Axes, title: str, columns: int) -> Figure:
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return titled(figure, title)
+    outside_legend(
+        figure, handles, labels, columns, fontsize=FONT_SIZE, title=title, handlelength=None
+    )
+    return figure
+
+
+def outside_legend(
+    figure: Figure,
+    handles: Sequence[Any],
+    labels: Sequence[str],
+    columns: int,
+    *,
+    fontsize: float,
+    title: str = "",
+    below: bool = False,
+    handlelength: float | None = None,
+) -> None:
+    """Put a legend above or below the diagrams of a figure, in a strip that is kept free for it.
+
+    matplotlib before 3.7 does not know the places "outside ...".
+    """
+    columns = min(columns, len(handles))
+    rows = math.ceil(len(handles) / columns)
+    points = fontsize * (1.5 * rows + 1.0) + (1.5 * (fontsize + 1.0) if title else 0.0)
+    strip = points / 72.0 / figure.get_size_inches()[1]
+    place = (0.0, strip if below else 0.0, 1.0, 1.0 - strip)
+    figure.set_layout_engine("constrained", rect=place)
     figure.legend(
         handles,
         labels,
-        loc="outside upper center",
-        ncols=min(columns, len(handles)),
-        fontsize=FONT_SIZE,
+        loc="lower center" if below else "upper center",
+        ncols=columns,
+        fontsize=fontsize,
         title=title or None,
-        title_fontsize=FONT_SIZE + 1.0,
+        title_fontsize=fontsize + 1.0,
         frameon=False,
+        handlelength=handlelength,
     )
-    return figure
 
 
 def finish_bar(bar: Colorbar, label: str) -> None:

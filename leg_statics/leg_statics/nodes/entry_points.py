@@ -6,5 +6,6 @@ from functools import partial
 from leg_kinematics.nodes.entry_points import start
 
 designs_node = partial(start, "leg_statics.nodes.designs_node")
+gait_node = partial(start, "leg_statics.nodes.gait_node")
 maps_node = partial(start, "leg_statics.nodes.maps_node")
 statics_node = partial(start, "leg_statics.nodes.statics_node")

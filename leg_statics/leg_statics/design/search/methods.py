@@ -103,7 +103,7 @@ def search_differential_evolution(draw: Draw, evaluate: Evaluate) -> None:
         maxiter=draw.generations - 1,
         atol=-math.inf,  # goes on to the end of the budget
         polish=False,
-        rng=draw.seed,
+        seed=np.random.default_rng(draw.seed),
         updating="deferred",
         vectorized=True,
     )
@@ -137,7 +137,7 @@ def search_nsga2(draw: Draw, evaluate: Evaluate) -> None:
 def _sobol_points(draw: Draw) -> Iterator[FloatArray]:
     from scipy.stats import qmc  # slow to import
 
-    sampler = qmc.Sobol(len(draw.cells), rng=draw.seed)
+    sampler = qmc.Sobol(len(draw.cells), seed=np.random.default_rng(draw.seed))
     blocks = math.ceil(draw.designs / SAMPLES_AT_ONCE)
     points = (point for _ in range(blocks) for point in sampler.random(SAMPLES_AT_ONCE))
     return itertools.islice(points, draw.designs)
@@ -147,7 +147,7 @@ def _first_population(draw: Draw) -> FloatArray:
     """Return a Latin hypercube, moved to the cells."""
     from scipy.stats import qmc  # slow to import
 
-    sampler = qmc.LatinHypercube(len(draw.cells), rng=draw.seed)
+    sampler = qmc.LatinHypercube(len(draw.cells), seed=np.random.default_rng(draw.seed))
     return snap(sampler.random(draw.population), draw.cells)
 
 

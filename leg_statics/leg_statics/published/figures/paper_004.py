@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from leg_kinematics.arrays import FloatArray
-from leg_statics.drawing.style import write_figure
+from leg_statics.drawing.style import outside_legend, write_figure
 from leg_statics.published.paper_004 import (
     DURATION,
     drive_motion,
@@ -75,13 +75,8 @@ def output_figure() -> Figure:
     figure.align_ylabels()
     upper.set_title("Output shaft of the auxiliary chain", loc="left")
     lower.set_xlabel("time [s]")
-    figure.legend(
-        *upper.get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=4,
-        frameon=False,
-        handlelength=3.5,
-    )
+    handles, labels = upper.get_legend_handles_labels()
+    outside_legend(figure, handles, labels, 4, fontsize=10.0, below=True, handlelength=3.5)
     return figure
 
 
