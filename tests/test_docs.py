@@ -79,7 +79,7 @@ def test_what_the_snippets_of_the_readme_import_exists(reference):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_the_commands_that_a_page_names_exist(page):
     text = page.read_text()
-    for package, command in re.findall(r"ros2 run (\w+) (\w+)", text):
+    for package, command in re.findall(r"ros2 run ([a-z]\w+) (\w+)", text):
         scripts = importlib.metadata.distribution(package).entry_points.select(name=command)
         assert scripts, command
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)

@@ -26,7 +26,7 @@ SAID = {
     "01_ask_one_foothold.py": "carries 500 N",
     "02_rank_ten_thousand.py": "10000 candidates",
     "03_choose_height_and_step.py": "cement",
-    "04_walk_over_terrain.py": "Arrived",
+    "04_walk_over_terrain.py": "x  2.00 m",
     "my_planner.py": "longest step of all six legs",
 }
 # Targets that run the tests, or run long: that make knows them is enough here.

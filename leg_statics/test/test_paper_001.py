@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from leg_statics.published.comparison import Comparison
+from leg_statics.published.comparison import Comparison, compare_direction
 from leg_statics.published.paper_001 import (
     NEAREST_VARPHI,
     SYMMETRIC_VARPHI,
@@ -98,3 +98,12 @@ def test_comparisons_tell_what_does_not_hold():
         "K_F falls upwards and is least at the top": False,
         "K_J is best in the middle and worse towards the rim": True,
     }
+
+
+def test_directions_are_compared_as_lines():
+    same = compare_direction("001", "v", (0.6, -0.8), (-0.6, 0.8))
+    assert same.holds
+    assert same.ours == "0.600, -0.800"
+    turned = compare_direction("001", "v", (1.0, 0.0), (0.0, 2.0))
+    assert turned.verdict == "differs by 90.0°"
+    assert compare_direction("001", "v", (1.0, 0.0), (1.0, 0.05)).verdict.endswith("within 2.9°")

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 REPRODUCED = "reproduced"
 CONTRADICTED = "contradicted"
+NO_VALUE = "has no value"
 
 
 class Comparison(NamedTuple):
@@ -18,7 +21,8 @@ class Comparison(NamedTuple):
         published: What the paper prints.
         ours: What we compute.
         difference: Relative difference, or "" for a claim.
-        verdict: "reproduced", "reproduced within x %", "differs by x %" or "contradicted".
+        verdict: "reproduced", "reproduced within x %", "differs by x %", "contradicted", or "has no
+            value" for a number that ours does not converge to.
         note: Reason or condition.
     """
 
@@ -79,6 +83,43 @@ def compare_number(
     )
 
 
+def compare_direction(
+    paper: str,
+    item: str,
+    published: Sequence[float],
+    ours: Sequence[float],
+    *,
+    exact: float = 0.5,
+    acceptable: float = 5.0,
+    note: str = "",
+) -> Comparison:
+    """Compare a published vector with ours by the angle between their lines: its sign is free.
+
+    Args:
+        paper: Number of the paper.
+        item: What the vector is.
+        published: The printed vector.
+        ours: Our vector.
+        exact: Angle up to which the direction counts as reproduced [deg].
+        acceptable: Angle up to which it counts as reproduced within an angle [deg].
+        note: Reason or condition.
+    """
+    inner = sum(a * b for a, b in zip(published, ours, strict=True))
+    cosine = abs(inner) / (math.hypot(*published) * math.hypot(*ours))
+    degrees = math.degrees(math.acos(min(1.0, cosine)))
+    angle = f"{degrees:.1f}°"
+    if degrees <= exact:
+        verdict = REPRODUCED
+    elif degrees <= acceptable:
+        verdict = f"{REPRODUCED} within {angle}"
+    else:
+        verdict = f"differs by {angle}"
+    sign = math.copysign(1.0, inner)
+    printed = ", ".join(f"{value:.3f}" for value in published)
+    found = ", ".join(f"{sign * value:.3f}" for value in ours)
+    return Comparison(paper, item, printed, found, angle, verdict, note)
+
+
 def compare_claim(paper: str, claim: str, holds: bool, evidence: str, note: str = "") -> Comparison:
     """Compare a claim made in words with what the computation shows.
 
@@ -92,3 +133,15 @@ def compare_claim(paper: str, claim: str, holds: bool, evidence: str, note: str 
     return Comparison(
         paper, claim, "stated", evidence, "", REPRODUCED if holds else CONTRADICTED, note
     )
+
+
+def no_value(paper: str, item: str, published: float, reason: str) -> Comparison:
+    """Compare a published number with a computation that has no result.
+
+    Args:
+        paper: Number of the paper.
+        item: What the number is.
+        published: The printed value.
+        reason: Why there is none.
+    """
+    return Comparison(paper, item, f"{published:g}", "none", "", NO_VALUE, reason)

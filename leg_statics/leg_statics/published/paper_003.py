@@ -41,6 +41,7 @@ LARGEST_DEVIATION = 0.26  # of the foot from Jansen's: "smaller than" [cranks]
 CRANK_SPEED = 30.0 * 2.0 * math.pi / 60.0
 WALKING_SPEED = 0.06
 FRAME_HEIGHTS = (0.140, 0.1422)
+ASSUMED_CRANK = 0.015  # m, of the shipped walker
 
 
 class Legs(NamedTuple):
@@ -137,6 +138,36 @@ def claim_comparisons() -> list[Comparison]:
     return [compare_claim(PAPER, *claim) for claim in claims]
 
 
+def prototype_comparisons() -> list[Comparison]:
+    """Compare what the text prints of the walking prototype, without slip.
+
+    Its crank length is in a table that the copy lacks: the assumed one was chosen to suit the
+    speed, which therefore confirms nothing; the rise and fall of the frame may.
+    """
+    curve = gait_curve(synthesize(PAPER_PHI_MAX).mechanism())
+    turns = CRANK_SPEED / (2.0 * math.pi)
+    low, high = FRAME_HEIGHTS
+    note = f"crank of {1e3 * ASSUMED_CRANK:g} mm, assumed"
+    return [
+        compare_number(
+            PAPER,
+            "walking speed at 30 r/min",
+            WALKING_SPEED,
+            turns * 2.0 * curve.stride * ASSUMED_CRANK,
+            unit="m/s",
+            note=f"{note} to suit it",
+        ),
+        compare_number(
+            PAPER,
+            f"rise and fall of the frame, {1e3 * low:g} to {1e3 * high:g} mm",
+            1e3 * (high - low),
+            1e3 * ASSUMED_CRANK * curve.body_fluctuation,
+            unit="mm",
+            note=note,
+        ),
+    ]
+
+
 def comparisons() -> list[Comparison]:
     """Return every published number and claim beside ours."""
-    return number_comparisons() + claim_comparisons()
+    return number_comparisons() + claim_comparisons() + prototype_comparisons()
