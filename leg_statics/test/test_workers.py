@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
 
 import pytest
 
@@ -182,6 +183,16 @@ def test_a_dask_worker_that_is_killed_costs_no_result_and_a_lost_scheduler_is_to
         cluster.scheduler.kill()
         with pytest.raises(WorkerError, match=r"scheduler tcp://127\.0\.0\.1:.*lost"):
             list(endless)
+
+
+def test_what_is_asked_of_a_client_that_has_closed_is_lost(cluster):
+    with open_workers(scheduler=cluster.address()) as workers:
+        workers._client.sync(workers._client._close)  # as it does when it has lost its scheduler
+        with pytest.raises(WorkerError, match=r"scheduler tcp://127\.0\.0\.1:.*lost"):
+            list(workers.map(eval, ["1"]))
+        # what Dask takes while its client closes it neither hands out nor cancels
+        with pytest.raises(WorkerError, match="no answer"):
+            workers._result(Future())
 
 
 def test_a_scheduler_out_of_reach_is_told(monkeypatch):

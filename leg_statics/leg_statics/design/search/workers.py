@@ -18,9 +18,9 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import Any, Generic, TypeVar
@@ -33,7 +33,7 @@ Result = TypeVar("Result")
 
 AHEAD = 3  # items in hand or waiting for each worker, so that none is idle
 MOST_LOSSES = 2  # workers may die that often in a row without anything being done
-COUNT_PERIOD = 2.0  # workers may join and leave a cluster [s]
+COUNT_PERIOD = 2.0  # workers may join and leave a cluster, which may end [s]
 CONNECT_TIMEOUT = 10.0  # the scheduler and its first worker answer within that time [s]
 
 
@@ -78,6 +78,10 @@ class Workers(ABC):
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Hand out an item."""
 
+    def _result(self, future: Future[Result]) -> Result:
+        """Wait for the result of what was handed out, or raise that its worker is lost."""
+        return future.result()
+
     @abstractmethod
     def _recover(self, error: BaseException) -> None:
         """Replace workers that were lost, or raise a WorkerError."""
@@ -112,7 +116,7 @@ class Workers(ABC):
                 try:
                     for task in tasks:
                         task.future = task.future or self._submit(function, task.item)
-                    result: Any = tasks[0].future.result()  # type: ignore[union-attr]
+                    result: Any = self._result(tasks[0].future)  # type: ignore[arg-type]
                 except self.losses as error:
                     self._recover(error)
                     for task in tasks:
@@ -220,10 +224,11 @@ class DaskWorkers(Workers):
 
     def __init__(self, address: str) -> None:
         from distributed import Client, KilledWorker  # slow to import
-        from distributed.client import FutureCancelledError
+        from distributed.client import ClosedClientError, FutureCancelledError
         from distributed.comm.core import CommClosedError
 
-        self.losses = (KilledWorker, CommClosedError, FutureCancelledError, CancelledError)
+        lost_here = (CommClosedError, ClosedClientError)
+        self.losses = (KilledWorker, *lost_here, FutureCancelledError, CancelledError)
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are raised here
         self._address = address
         self._count, self._counted = 1, -math.inf
@@ -252,12 +257,20 @@ class DaskWorkers(Workers):
 
     def close(self) -> None:
         """Drop what is under way and leave the cluster."""
-        self._executor.shutdown(wait=False)
+        with suppress(*self.losses):  # the client may have closed by itself
+            self._executor.shutdown(wait=False)
         self._client.close()
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         future: Future[Result] = self._executor.submit(function, item)
         return future
+
+    def _result(self, future: Future[Result]) -> Result:
+        # What is handed out while the client closes, having lost its scheduler, never ends.
+        while not wait([future], COUNT_PERIOD).done:
+            if self._client.status in ("closing", "closed"):
+                self._recover(ConnectionError("no answer"))
+        return future.result()
 
     def _recover(self, error: BaseException) -> None:
         # The scheduler has handed the work to other workers already, as often as it allows.
