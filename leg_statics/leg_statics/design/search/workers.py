@@ -248,6 +248,7 @@ class DaskWorkers(Workers):
     def count(self) -> int:
         """Number of threads of all workers, now or a moment ago; one while there is none."""
         if time.monotonic() > self._counted + COUNT_PERIOD:
+            self._check_open()
             try:
                 self._count = max(1, sum(self._client.nthreads().values()))
             except OSError as error:
@@ -268,9 +269,12 @@ class DaskWorkers(Workers):
     def _result(self, future: Future[Result]) -> Result:
         # What is handed out while the client closes, having lost its scheduler, never ends.
         while not wait([future], COUNT_PERIOD).done:
-            if self._client.status in ("closing", "closed"):
-                self._recover(ConnectionError("no answer"))
+            self._check_open()
         return future.result()
+
+    def _check_open(self) -> None:
+        if self._client.status in ("closing", "closed"):
+            self._recover(ConnectionError("no answer"))
 
     def _recover(self, error: BaseException) -> None:
         # The scheduler has handed the work to other workers already, as often as it allows.
