@@ -28,6 +28,9 @@ from leg_statics.recordings.judge_bag import main
 from leg_statics.recordings.query_judge import QueryFindings, QueryJudge
 
 NODE = "/planner/statics"
+PREFIX = "planner/"  # of the robot's frames
+BASE = f"{PREFIX}base_link"
+OF_PLANNER = ("--node", NODE, "--frame-prefix", PREFIX)
 FOOTHOLDS, STEPS = (f"{NODE}/query_{what}/_service_event" for what in ("footholds", "step_length"))
 EVENT = "leg_msgs/srv/QueryFootholds_Event"
 OTHERS = {"query_step_length", "get_leg_description"}  # what is asked beside footholds
@@ -45,7 +48,12 @@ def ask(client):
     answers = [client.query_footholds("left_front", feet(100), "cement", 300.0)]
     client.query_footholds("right_rear", feet(50), Ground("wood", SLOPE), 200.0, efforts=True)
     client.query_footholds(
-        "left_rear", feet(20, UNDER_LEFT_REAR), 0.3, 100.0, frame="base_link", moment=[1, 2, 3]
+        "left_rear",
+        feet(20, UNDER_LEFT_REAR),
+        0.3,
+        100.0,
+        frame=f"{PREFIX}base_link",
+        moment=[1, 2, 3],
     )
     client.query_footholds("left_front", np.empty((0, 3)), "cement", 300.0)
     client.query_footholds("left_front", feet(30, [0.0, 0.0, -3.0]), "cement", 300.0)
@@ -82,7 +90,7 @@ def topics_of(record):
 def recorded(tmp_path_factory):
     """A recording of a planner's queries, and what the planner was answered."""
     folder = tmp_path_factory.mktemp("queries") / "plan"
-    parameters = {"service_events": "contents", "max_points": 1000}
+    parameters = {"service_events": "contents", "max_points": 1000, "frame_prefix": PREFIX}
     with (
         NodeProcesses(names=["statics"], namespace="planner", parameters=parameters) as nodes,
         LegClient(namespace="planner", timeout=PATIENCE) as client,
@@ -110,7 +118,8 @@ def recorded(tmp_path_factory):
 def judged(path, robot="hexapod", node=NODE):
     """Judge the queries of a recording."""
     bag = Bag(path)
-    judge = BagJudge(bag, load_robot(robot), 0.4, Topics("", node=node))
+    robot = load_robot(robot).with_frame_prefix(PREFIX)
+    judge = BagJudge(bag, robot, 0.4, Topics("", node=node))
     queries, findings = QueryJudge(bag, load_grounds("grounds"), node), QueryFindings()
     for message in bag.messages():
         judge.take(message)
@@ -295,7 +304,7 @@ def test_an_event_that_is_cut_off_is_refused_and_the_others_judged(recorded, tmp
                 writer.write(message.topic, message.time, message.data[: len(message.data) // 2])
     report = tmp_path / "report.md"
     outputs = ["--table", str(tmp_path / "table.csv"), "--report", str(report)]
-    assert main([str(tmp_path / "bag"), "--node", NODE, *outputs]) == 0
+    assert main([str(tmp_path / "bag"), *OF_PLANNER, *outputs]) == 0
     assert f"{FOOTHOLDS}: no {EVENT}" in report.read_text()
     assert "0 differ." in report.read_text()
 
@@ -335,7 +344,7 @@ def test_a_definition_without_what_all_events_have_is_enough(recorded, tmp_path)
 
 def test_the_command_judges_a_recording_of_queries_alone(recorded, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main([str(recorded[0]), "--node", NODE, "--report", "plan.md"]) == 0
+    assert main([str(recorded[0]), *OF_PLANNER, "--report", "plan.md"]) == 0
     assert capsys.readouterr().out.split() == [
         *("plan_judged.parquet", "plan.md", "plan_judged_queries.parquet")
     ]
@@ -360,7 +369,7 @@ def test_the_command_judges_a_recording_of_queries_alone(recorded, tmp_path, cap
 
 def test_the_table_of_queries_may_be_csv(recorded, tmp_path):
     table = tmp_path / "plan.csv"
-    arguments = ["--node", NODE, "--table", str(table), "--report", str(tmp_path / "plan.html")]
+    arguments = [*OF_PLANNER, "--table", str(table), "--report", str(tmp_path / "plan.html")]
     assert main([str(recorded[0]), *arguments]) == 0
     rows = pyarrow.csv.read_csv(tmp_path / "plan_queries.csv")
     assert "left_front" in rows.column("legs").to_pylist()

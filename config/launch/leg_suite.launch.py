@@ -27,6 +27,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "namespace", default_value="", description="Namespace of the robot's nodes"
             ),
+            DeclareLaunchArgument(
+                "frame_prefix", default_value="", description="Before names of frames: robot_1/"
+            ),
             *(
                 DeclareLaunchArgument(
                     name, default_value="false", description=f"Whether to start the {name} node"
@@ -43,13 +46,16 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _node(node: dict[str, str], **options: Any) -> Node:
-    robot = ParameterValue(LaunchConfiguration("robot"), value_type=str)
+    parameters = {
+        name: ParameterValue(LaunchConfiguration(name), value_type=str)
+        for name in ("robot", "frame_prefix")
+    }
     return Node(
         package=node["package"],
         executable=node["executable"],
         name=node["name"],
         namespace=LaunchConfiguration("namespace"),
-        parameters=[{"robot": robot}],
+        parameters=[parameters],
         output="screen",
         **options,
     )

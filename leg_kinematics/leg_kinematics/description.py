@@ -34,6 +34,7 @@ import numpy as np
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.documents import (
+    FOREIGN_NAME,
     NAME,
     NUMBER,
     PAIR,
@@ -67,7 +68,7 @@ EFFORT = {
 ROBOT_SCHEMA = mapping_schema(
     {
         "name": NAME,
-        "base_frame": NAME,
+        "base_frame": FOREIGN_NAME,
         "units": mapping_schema(
             {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
         ),
@@ -85,7 +86,7 @@ ROBOT_SCHEMA = mapping_schema(
                     "type": NAME,
                     "mount": mapping_schema({"position": VECTOR, "rpy": VECTOR}, ["position"]),
                     "mirrored": {"type": "boolean"},
-                    "frame": NAME,
+                    "frame": FOREIGN_NAME,
                     "joint_names": {"type": "object"},
                 },
                 ["type", "mount"],
@@ -247,7 +248,7 @@ def _leg(
     joints = [joint.name for joint in original.joints]
     joint_names = entry.get("joint_names", {})
     if joint_names:
-        schema = mapping_schema(dict.fromkeys(joints, NAME), ())
+        schema = mapping_schema(dict.fromkeys(joints, FOREIGN_NAME), ())
         document.check(schema, "legs", name, "joint_names")
     try:
         mechanism: Any = Mirrored(original) if entry.get("mirrored", False) else original

@@ -24,6 +24,12 @@ MOST_MISTAKES = 20  # that are told
 LONGEST_VALUE = 120  # characters of a value that are told
 
 NAME = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": 100}
+# What others name: joints and frames of a robot, which may be one of several in a tree of frames.
+FOREIGN_NAME = {
+    "type": "string",
+    "pattern": "^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$",
+    "maxLength": 100,
+}
 NUMBER = {"type": "number"}
 PAIR = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
 VECTOR = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}

@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
-from leg_kinematics.errors import ShapeError, UnknownNameError
+from leg_kinematics.errors import ShapeError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import Mirrored
+
+FRAME_PREFIX = r"(?!/)(?!.*//)[A-Za-z0-9_./-]*"
 
 
 @dataclass(frozen=True)
@@ -131,6 +134,23 @@ class Robot:
             return self.legs[name]
         except KeyError:
             raise UnknownNameError("leg", name, self.legs) from None
+
+    def with_frame_prefix(self, prefix: str) -> Robot:
+        """Return the robot with other names of its frames, as one of several that show together.
+
+        Args:
+            prefix: What stands before each name, such as "robot_1/"; the `frame_prefix` of ROS's
+                robot_state_publisher.
+
+        Raises:
+            ValueRangeError: If names of frames cannot begin with it.
+        """
+        if not re.fullmatch(FRAME_PREFIX, prefix):
+            raise ValueRangeError(
+                f"frame_prefix: got {prefix!r}; allowed: letters, digits, _ . - and / between"
+            )
+        legs = {name: replace(leg, frame=f"{prefix}{leg.frame}") for name, leg in self.legs.items()}
+        return replace(self, base_frame=f"{prefix}{self.base_frame}", legs=legs)
 
     def effort_limits(self) -> tuple[tuple[str, ...], FloatArray]:
         """Return all joint names and their effort limits (sum of n, 2) [N.m or N]."""

@@ -180,6 +180,24 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path, content):
         load_robot(path)
 
 
+@pytest.mark.parametrize("name", ["robot_1/lf-hip", "1st.frame", "a/b/c"])
+def test_frames_and_joints_have_the_names_that_others_gave_them(edited, name):
+    old = "    mirrored: true\n"
+    leg = next(iter(load_robot(edited(old, f"{old}    frame: {name}\n")).legs.values()))
+    assert leg.frame == name
+    leg = next(
+        iter(load_robot(edited(old, f"{old}    joint_names: {{crank_1: {name}}}\n")).legs.values())
+    )
+    assert leg.joint_names[0] == name
+    assert load_robot(edited("base_frame: base_link", f"base_frame: {name}")).base_frame == name
+
+
+@pytest.mark.parametrize("name", ["/base_link", "base_link/", "a//b", "base link", "a:b"])
+def test_names_that_no_tree_of_frames_has_are_refused(edited, name):
+    with pytest.raises(DescriptionError, match="base_frame"):
+        load_robot(edited("base_frame: base_link", f"base_frame: '{name}'"))
+
+
 def test_a_missing_file_and_an_unknown_robot_are_told(tmp_path):
     with pytest.raises(DescriptionError, match="does not exist"):
         load_robot(tmp_path / "none.yaml")

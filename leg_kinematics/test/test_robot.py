@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from leg_kinematics import Leg, ParallelDrive, ShapeError
+from leg_kinematics import Leg, ParallelDrive, ShapeError, ValueRangeError, load_robot
 
 
 def test_a_leg_by_itself_is_a_mechanism_with_limits_at_the_origin():
@@ -27,3 +27,19 @@ def test_one_pair_of_limits_is_that_of_all_actuators_and_none_limits_nothing():
 def test_limits_of_another_shape_are_refused(limits):
     with pytest.raises(ShapeError, match="effort_limits"):
         Leg.of(ParallelDrive(), limits)
+
+
+def test_a_prefix_stands_before_the_names_of_frames_and_of_nothing_else():
+    plain = load_robot("hexapod")
+    robot = plain.with_frame_prefix("fleet-2/robot_1/")
+    assert robot.base_frame == f"fleet-2/robot_1/{plain.base_frame}"
+    for leg, same in zip(robot.legs.values(), plain.legs.values(), strict=True):
+        assert leg.frame == f"fleet-2/robot_1/{same.frame}"
+        assert (leg.name, leg.joint_names) == (same.name, same.joint_names)
+    assert plain.with_frame_prefix("").base_frame == plain.base_frame
+
+
+@pytest.mark.parametrize("prefix", ["/robot_1/", "robot//", "robot 1/", "robot\n", "ä/"])
+def test_a_prefix_that_makes_no_frame_is_refused(prefix):
+    with pytest.raises(ValueRangeError, match="frame_prefix"):
+        load_robot("hexapod").with_frame_prefix(prefix)

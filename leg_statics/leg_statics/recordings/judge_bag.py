@@ -85,6 +85,12 @@ def make_parser() -> argparse.ArgumentParser:
     which.add_argument(
         "--robot", default="hexapod", help="shipped robot or YAML file (default: %(default)s)"
     )
+    which.add_argument(
+        "--frame-prefix",
+        default="",
+        metavar="PREFIX",
+        help="the nodes' parameter frame_prefix, such as robot_1/ (default: none)",
+    )
     ground = which.add_mutually_exclusive_group()
     ground.add_argument(
         "--ground",
@@ -207,7 +213,7 @@ def _run(options: argparse.Namespace) -> list[Path]:
     for option, value in (("--contact-force", options.contact_force), ("--gap", options.gap)):
         if not 0.0 < value < math.inf:
             raise ValueRangeError(f"{option}: got {value:g}; allowed: > 0")
-    robot = load_robot(options.robot)
+    robot = load_robot(options.robot).with_frame_prefix(options.frame_prefix)
     grounds = load_grounds(options.grounds)
     ground, friction = _ground(options, grounds)
     bag = Bag(options.bag)
