@@ -282,6 +282,45 @@ def test_a_shared_node_may_be_asked_from_another_thread(planner):
     assert len(planner.client.effort_limits().joint_names) == 18
 
 
+def test_a_call_that_blocks_the_callback_it_waits_in_blames_the_callback(suite):
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = Node("blocked", context=context)
+    client = LegClient(node=node, timeout=0.5)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    told = []
+
+    def ask():
+        timer.cancel()
+        wait_for(lambda: node.count_services("/kinematics/inverse_kinematics"))
+        with pytest.raises(errors.TimedOutError) as caught:
+            client.inverse_kinematics("left_front", FOOT)
+        told.append(caught.value.message)
+
+    timer = node.create_timer(0.01, ask)
+    while not told:
+        executor.spin_once(timeout_sec=0.1)
+    assert "no executor worked for the client's node" in told[0]
+    client.close()
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def test_a_client_of_another_namespace_is_told_which_servers_there_are(suite):
+    with LegClient(namespace="robot_9", timeout=0.3) as client:
+        wait_for(lambda: client.node.count_services("/kinematics/inverse_kinematics"))
+        wait_for(lambda: client.node.count_services("/maps/compute_index_map/_action/send_goal"))
+        with pytest.raises(
+            errors.ServerUnavailableError,
+            match=r"no node serves /robot_9/kin.*; there is /kinematics/inverse_kinematics; ",
+        ):
+            client.inverse_kinematics("left_front", FOOT)
+        with pytest.raises(errors.ServerUnavailableError, match=r"there is /maps/compute_index"):
+            client.compute_index_map("left_front", 0.05)
+
+
 def test_a_closed_client_says_so(suite):
     client = LegClient()
     client.close()
@@ -327,22 +366,27 @@ def test_a_server_that_hangs_is_a_time_out_and_works_again_later(suite):
         assert client.inverse_kinematics("left_front", FOOT).status == 0
 
 
-def test_a_client_lives_through_a_restart_of_the_nodes():
+def test_a_client_lives_through_a_restart_and_a_crash_of_nodes():
     outputs = []
     nodes = NodeProcesses(namespace="robot_1", stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     with nodes, LegClient(namespace="robot_1", timeout=START_TIMEOUT) as client:
         wait_until_ready(client, nodes)
         wanted = client.inverse_kinematics("left_front", FOOT).joint_positions
-        nodes.processes["kinematics"].send_signal(signal.SIGINT)
-        nodes.processes["maps"].send_signal(signal.SIGINT)
-        nodes.processes["statics"].send_signal(signal.SIGTERM)
-        for process in nodes.processes.values():
-            outputs.append(process.communicate(timeout=PATIENCE)[0].decode())
-            assert process.returncode == 0
-        future = client.inverse_kinematics.future("left_front", FOOT)  # nobody is there
+        capacity = client.query_footholds("left_front", FOOT, 0.4).load_capacity
+        for name, number, code in (
+            ("kinematics", signal.SIGKILL, -signal.SIGKILL),  # the middleware does not know yet
+            ("maps", signal.SIGINT, 0),
+            ("statics", signal.SIGTERM, 0),
+        ):
+            nodes.processes[name].send_signal(number)
+            outputs.append(nodes.processes[name].communicate(timeout=PATIENCE)[0].decode())
+            assert nodes.processes[name].returncode == code
+        solved = client.inverse_kinematics.future("left_front", FOOT)  # nobody is there
+        carried = client.query_footholds.future("left_front", FOOT, 0.4)
         for name in node_names():
             nodes.start(name)
-        np.testing.assert_array_equal(future.wait().joint_positions, wanted)
+        np.testing.assert_array_equal(solved.wait().joint_positions, wanted)
+        assert carried.wait().load_capacity == capacity
         assert len(client.legs()) == 6
     for output in outputs:
         assert "Traceback" not in output

@@ -3,17 +3,16 @@
 
 import inspect
 import pydoc
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from leg_msgs.msg import ErrorCode
-from leg_msgs.srv import QueryFootholds
+from leg_msgs.srv import GetLegDescription, QueryFootholds
 from leg_msgs_py.client import SERVICES, LegClient, footholds
 from leg_msgs_py.client.calls import CallFuture
 from leg_msgs_py.client.footholds import Footholds
 from leg_msgs_py.client.questions import Order, Question
-from leg_msgs_py.errors import InvalidInputError, TooLargeError, check
+from leg_msgs_py.errors import InvalidInputError, TooLargeError, UnknownLegError, check
 from leg_msgs_py.naming import interface_name
 
 METHODS = {
@@ -31,9 +30,9 @@ class FakeCaller:
         self.response = response
         self.sent = []
 
-    def call(self, name, service, request, decode, check_error):
+    def call(self, name, service, request, decode):
         self.sent.append((name, service, request))
-        check_error(self.response.error)
+        check(self.response.error)
         future = CallFuture()
         future.settle(decode(self.response))
         return future
@@ -44,6 +43,7 @@ class Planner:
 
     query_footholds = footholds.query_footholds
     legs = LegClient.__dict__["legs"]
+    describe = LegClient.__dict__["describe"]
 
     def __init__(self, response, max_points=100):
         self.caller = FakeCaller(response)
@@ -124,10 +124,12 @@ def test_an_answer_for_other_points_is_refused():
         Planner(empty_answer(5)).query_footholds("left_front", FEET, 0.3)
 
 
-def test_the_names_of_legs_come_also_with_a_failure():
-    response = SimpleNamespace(legs=["left", "right"], error=ErrorCode(code=-1, message="which?"))
+def test_a_leg_without_a_name_is_that_of_a_robot_with_one_leg():
+    response = GetLegDescription.Response(legs=["left", "right"])
+    response.error.code = ErrorCode.SUCCESS
     assert Planner(response).legs() == ("left", "right")
-    assert METHODS["describe"].make("").check is check
+    with pytest.raises(UnknownLegError, match="got ''; allowed: left, right"):
+        Planner(response).describe("")
 
 
 @pytest.mark.parametrize("what", ["heights", "lateral_offsets"])

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import rclpy
-from leg_msgs.msg import ErrorCode
 from leg_msgs_py.errors import CancelledError, ServerUnavailableError, TimedOutError, check
+from leg_msgs_py.naming import type_name
 from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -73,11 +73,65 @@ class CallFuture(Future, Generic[T]):
         return answer
 
 
+class Server:
+    """The nodes that serve a service, as the client's node sees them.
+
+    Args:
+        node: The client's node.
+        service: Full name of the service.
+        type_name: Its type, such as "leg_msgs/srv/QueryFootholds".
+    """
+
+    def __init__(self, node: Node, service: str, type_name: str) -> None:
+        self._node, self._service, self._type = node, service, type_name
+        self._count = node.count_services(service)
+        self._turned: threading.Event | None = None
+
+    def has_come(self) -> bool:
+        """Whether one has come since the last look.
+
+        What was sent to a server that crashed is lost, and only much later does the middleware tell
+        that it is gone; its successor may be there long since.
+        """
+        if self._turned is None and self._node.executor is not None:
+            self._turned = threading.Event()
+            self._node.executor.create_task(self._turned.set)
+        before, self._count = self._count, self._node.count_services(self._service)
+        return self._count > before
+
+    def silence(self, what: str, timeout: float) -> TimedOutError:
+        """Return the error for an answer that did not come in time, though there is a server."""
+        if self._turned is None or not self._turned.is_set():
+            return TimedOutError(
+                f"{self._service}: an answer could not be heard, since no executor worked for the "
+                f"client's node within {timeout:g} s: in its callbacks `await` futures, and wait "
+                "for answers in other threads"
+            )
+        return TimedOutError(what)
+
+    def absence(self, timeout: float) -> ServerUnavailableError:
+        """Return the error for a server that was not there in time."""
+        others = [
+            name
+            for name, types in self._node.get_service_names_and_types()
+            if self._type in types and self._node.count_services(name)  # not clients alone
+        ]
+        hint = (
+            f"there is {', '.join(sorted(others))}; is the client's namespace right?"
+            if others
+            else "does it run, with the same ROS_DOMAIN_ID?"
+        )
+        return ServerUnavailableError(
+            f"no node serves {self._service}, waited {timeout:g} s; {hint}"
+        )
+
+
 @dataclass(eq=False)
 class _Call:
     """One request on its way."""
 
     client: Any
+    server: Server
     request: Any
     decode: Callable[[Any], Any]
     future: CallFuture[Any]
@@ -109,34 +163,28 @@ class _Call:
             self.forget()
             return True
         available = self.client.service_is_ready()
-        if time.monotonic() > self.deadline:
-            if available:
-                message = f"{self.client.srv_name} gave no answer within {timeout:g} s"
-                error = TimedOutError(message)
-            else:
-                error = server_unavailable(self.client.srv_name, timeout)
+        if self.server.has_come() or not available:
             self.forget()
-            self.future.settle(error=error)
+        if time.monotonic() > self.deadline:
+            self.forget()
+            self.future.settle(
+                error=self.server.silence(
+                    f"{self.client.srv_name} gave no answer within {timeout:g} s", timeout
+                )
+                if available
+                else self.server.absence(timeout)
+            )
             return True
         if available and self.sent is None and may_send(self.client):
             self.send()
-        elif not available:
-            self.forget()
         return False
-
-
-def server_unavailable(name: str, timeout: float) -> ServerUnavailableError:
-    """Return the error for a server that was not there in time."""
-    return ServerUnavailableError(
-        f"no node serves {name}, waited {timeout:g} s; does it run, with the same ROS_DOMAIN_ID?"
-    )
 
 
 class Caller:
     """Sends requests of any service through a node, its own or one that already spins.
 
-    All requests are idempotent: one that was on its way when the server went away is sent again to
-    the server that takes its place, until the time allowed is over.
+    All requests are idempotent: one that was on its way when the server ended or crashed is sent
+    again to the server that takes its place, until the time allowed is over.
 
     Args:
         node: A node that spins elsewhere; None makes a node that spins in a background thread.
@@ -191,10 +239,11 @@ class Caller:
             ServerUnavailableError: If one is not there in time.
         """
         deadline = time.monotonic() + timeout
-        for client in [self.client(*service) for service in services]:
+        for name, kind in services:
+            client = self.client(name, kind)
             while not client.service_is_ready():
                 if time.monotonic() > deadline:
-                    raise server_unavailable(client.srv_name, timeout)
+                    raise Server(self.node, name, type_name(kind)).absence(timeout)
                 time.sleep(WATCH_PERIOD)
 
     def call(
@@ -203,7 +252,6 @@ class Caller:
         service_type: Any,
         request: Any,
         decode: Callable[[Any], T],
-        check_error: Callable[[ErrorCode], None] = check,
     ) -> CallFuture[T]:
         """Send a request and return the future of its decoded answer.
 
@@ -212,16 +260,17 @@ class Caller:
             service_type: Its type.
             request: The request.
             decode: Makes the result of a response.
-            check_error: Raises if the response's error tells of a failure.
         """
 
         def checked(response: Any) -> T:
-            check_error(response.error)
+            check(response.error)
             return decode(response)
 
         future: CallFuture[T] = CallFuture(self.future_executor)
         deadline = time.monotonic() + self.timeout
-        call = _Call(self.client(service, service_type), request, checked, future, deadline)
+        client = self.client(service, service_type)
+        server = Server(self.node, service, type_name(service_type))
+        call = _Call(client, server, request, checked, future, deadline)
         with self._lock:
             if call.client.service_is_ready() and self._may_send(call.client):
                 call.send()

@@ -9,6 +9,7 @@ import numpy as np
 from leg_msgs.srv import GetLegDescription
 from leg_msgs_py.arrays import FloatArray, from_field
 from leg_msgs_py.client.questions import Request, question
+from leg_msgs_py.errors import UnknownLegError
 
 
 class GeometryParameter(NamedTuple):
@@ -134,12 +135,7 @@ class LegDescription(NamedTuple):
 @question("statics", GetLegDescription)
 def legs() -> Request[tuple[str, ...]]:
     """Return the names of all legs of the robot."""
-    # The names come with the answer for any leg, also if there is none of that name.
-    return Request(
-        GetLegDescription.Request(),
-        lambda response: tuple(response.legs),
-        check=lambda error: None,
-    )
+    return Request(GetLegDescription.Request(), lambda response: tuple(response.legs))
 
 
 @question("statics", GetLegDescription)
@@ -149,7 +145,10 @@ def describe(leg: str) -> Request[LegDescription]:
     Args:
         leg: Name of the leg; "" if the robot has exactly one.
     """
-    return Request(
-        GetLegDescription.Request(leg=leg),
-        lambda response: LegDescription.from_message(response.description),
-    )
+
+    def decode(response: Any) -> LegDescription:
+        if not response.description.leg:  # without a name the node tells those of several legs
+            raise UnknownLegError(f"leg: got ''; allowed: {', '.join(response.legs)}")
+        return LegDescription.from_message(response.description)
+
+    return Request(GetLegDescription.Request(leg=leg), decode)

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from leg_msgs.msg import ErrorCode
-from leg_msgs_py.client.calls import Caller, CallFuture, server_unavailable
-from leg_msgs_py.errors import CancelledError, LegServiceError, TimedOutError, check
+from leg_msgs_py.client.calls import Caller, CallFuture, Server
+from leg_msgs_py.errors import CancelledError, LegServiceError, check
+from leg_msgs_py.naming import type_name
 
 T = TypeVar("T")
 
@@ -39,6 +40,9 @@ class _Goal:
     ) -> None:
         self.name = action[0]
         self.client = caller.action_client(*action)
+        self._server = Server(
+            caller.node, f"{self.name}/_action/send_goal", f"{type_name(action[1])}_SendGoal"
+        )
         self.sent = False
         self.future: GoalFuture[Any] = GoalFuture(caller.future_executor, self.cancel)
         self._caller = caller
@@ -59,20 +63,22 @@ class _Goal:
         if self.over:
             return True
         available = self.client.server_is_ready()
+        if self._server.has_come() or not available:
+            self.sent, self._handle = False, None
         if time.monotonic() > self._heard + timeout:
             self.forget()
             self.future.settle(
-                error=TimedOutError(f"{self.name} gave no sign of life for {timeout:g} s")
+                error=self._server.silence(
+                    f"{self.name} gave no sign of life for {timeout:g} s", timeout
+                )
                 if available
-                else server_unavailable(self.name, timeout)
+                else self._server.absence(timeout)
             )
             return True
         if available and not self.sent and may_send(self.client):
             self.sent = True
             # rclpy loses an answer that comes before the request is noted: send in its thread.
             self._caller.node.executor.create_task(self._send)
-        elif not available:
-            self.sent, self._handle = False, None
         return False
 
     def forget(self) -> None:

@@ -28,11 +28,9 @@ from typing import (
     overload,
 )
 
-from leg_msgs.msg import ErrorCode
 from leg_msgs_py.client.calls import Caller, CallFuture
 from leg_msgs_py.client.goals import GoalFuture, send_goal
 from leg_msgs_py.client.inputs import Points
-from leg_msgs_py.errors import check
 from leg_msgs_py.naming import interface_name
 
 P = ParamSpec("P")
@@ -48,13 +46,11 @@ class Request(Generic[T]):
         message: The request.
         decode: Makes the answer of a response.
         points: The points that it asks about, of which a client accepts only so many.
-        check: Raises if the response's error tells of a failure.
     """
 
     message: Any
     decode: Callable[[Any], T]
     points: Points | None = None
-    check: Callable[[ErrorCode], None] = check
 
 
 @dataclass(frozen=True)
@@ -160,9 +156,7 @@ class Question(_Method[P, T, CallFuture[T]]):
         if content.points is not None:
             content.points.check_count(client.max_points)
         name = client.name_of(self.server, self.name)
-        return client.caller.call(
-            name, self.interface, content.message, content.decode, content.check
-        )
+        return client.caller.call(name, self.interface, content.message, content.decode)
 
 
 class Order(_Method[P, T, GoalFuture[T]]):

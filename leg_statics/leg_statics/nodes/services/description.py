@@ -23,8 +23,9 @@ def _fill_legs(host: Host, response: Any) -> None:
 
 @service(GetLegDescription, fill_always=_fill_legs, summary=no_points)
 def get_leg_description(host: Host, request: Any, response: Any) -> None:
-    """Fill the description of a leg."""
-    response.description = description_message(host.robot, host.robot.leg(request.leg))
+    """Fill the description of a leg, if one is meant."""
+    if request.leg or len(host.robot.legs) == 1:
+        response.description = description_message(host.robot, host.robot.leg(request.leg))
 
 
 def description_message(robot: Robot, leg: Leg) -> Any:
