@@ -29,7 +29,12 @@ def suite(tmp_path_factory):
     from leg_msgs_py.client import LegClient
 
     folders = f"[{tmp_path_factory.getbasetemp()}]"
-    parameters = {"max_points": MAX_POINTS, "diagnostics_rate": 10.0, "robot_folders": folders}
+    parameters = {
+        "max_points": MAX_POINTS,
+        "diagnostics_rate": 10.0,
+        "robot_folders": folders,
+        "service_events": "off",  # which YAML reads as false
+    }
     with NodeProcesses(parameters=parameters) as nodes, LegClient(timeout=PATIENCE) as client:
         wait_until_ready(client, nodes)
         yield SimpleNamespace(nodes=nodes, client=client)

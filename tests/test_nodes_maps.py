@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from leg_msgs.msg import ErrorCode
 from leg_msgs.msg import Ground as GroundMessage
 from leg_msgs.srv import GetIndexMap
@@ -384,6 +385,7 @@ def test_a_late_subscriber_receives_the_map_computed_last(suite, hexapod):
     own = suite.client.compute_index_map(LEG, 0.06, ["rated_friction", "load_capacity"], "wood")
     cloud = last_message(PointCloud2, "/maps/index_map")
     assert cloud.header.frame_id == hexapod.base_frame
+    assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec) == (0, 0)
     assert [field.name for field in cloud.fields] == [
         *("x", "y", "z"),
         *("rated_friction", "load_capacity"),
@@ -420,11 +422,14 @@ def markers(suite):
 
 
 def test_markers_show_every_leg_in_the_base_frame(markers, hexapod):
-    latest = markers.latest()
+    shown = {
+        name: marker for name, marker in markers.latest().items() if marker.action == Marker.ADD
+    }
     parts = ("linkage", "foot", "friction_cone", "force_polytope", "workspace")
-    assert set(latest) == {f"{leg}/{part}" for leg in hexapod.legs for part in parts}
-    for namespace, marker in latest.items():
-        assert marker.action == Marker.ADD
+    assert set(shown) == {f"{leg}/{part}" for leg in hexapod.legs for part in parts}
+    for namespace, marker in shown.items():
+        assert marker.frame_locked
+        assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (0, 0)
         assert marker.header.frame_id == hexapod.base_frame
         assert np.isfinite(markers.points(namespace)).all()
         assert len(marker.colors) in (0, len(marker.points))
@@ -436,6 +441,31 @@ def test_markers_show_every_leg_in_the_base_frame(markers, hexapod):
         workspace = markers.latest()[f"{name}/workspace"]
         assert len(workspace.points) > 50
         assert len({(c.r, c.g, c.b) for c in workspace.colors}) > 10
+
+
+def test_markers_of_a_former_robot_are_taken_away_until_it_comes_back(suite, markers, hexapod):
+    node, ghost = suite.client.node, "left_middle/linkage"
+    assert "left_middle" in hexapod.legs
+    assert set_parameter(node, "maps", "robot", "quadruped").successful
+    try:
+        wait_for(lambda: markers.latest()[ghost].action == Marker.DELETE)
+        assert markers.latest()["left_front/linkage"].action == Marker.ADD
+    finally:
+        assert set_parameter(node, "maps", "robot", "hexapod").successful
+    wait_for(lambda: markers.latest()[ghost].action == Marker.ADD)
+
+
+def test_while_a_simulation_is_paused_maps_are_delivered_and_diagnostics_told(suite):
+    node, told = suite.client.node, []
+    subscription = node.create_subscription(DiagnosticArray, "/diagnostics", told.append, 10)
+    assert set_parameter(node, "maps", "use_sim_time", True).successful
+    try:
+        assert suite.client.compute_index_map(LEG, 0.06, ["condition_number"]).fraction == 1.0
+        told.clear()
+        wait_for(lambda: any(message.status[0].name.startswith("/maps") for message in told))
+    finally:
+        assert set_parameter(node, "maps", "use_sim_time", False).successful
+        node.destroy_subscription(subscription)
 
 
 def test_markers_follow_the_joint_states(suite, markers, hexapod):

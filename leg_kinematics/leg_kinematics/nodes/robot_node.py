@@ -19,12 +19,14 @@ from rcl_interfaces.msg import (  # type: ignore[import-untyped]
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.service import Service as ServiceServer
 from rclpy.service_introspection import ServiceIntrospectionState
+from rclpy.timer import Timer
 from std_msgs.msg import Header
 
 from leg_kinematics.description import load_robot
@@ -78,6 +80,13 @@ class RobotNode(Node):
             "Folders of the descriptions that the parameter robot may be set to at run time.",
             read_only=True,
         )
+        self.declare(
+            "frame_prefix",
+            "",
+            "What stands before the names of the robot's frames, such as 'robot_1/', as in "
+            "robot_state_publisher.",
+            read_only=True,
+        )
         self.declare_number(
             "max_points", 1_000_000, "Points accepted in one request.", (1, 10_000_000)
         )
@@ -89,17 +98,18 @@ class RobotNode(Node):
             "off",
             "What is published of every call on the topic _service_event below each service: "
             f"{', '.join(SERVICE_EVENTS)} (requests and responses, for recordings).",
+            dynamic_typing=True,  # a bare `off` in YAML is no string
         )
-        _check_service_events(self.value("service_events"))
+        _introspection(self.value("service_events"))
         self._served: list[ServiceServer] = []
         self._robot_at_start = self.value("robot")
-        self.robot: Robot = load_robot(self._robot_at_start)
+        self.robot: Robot = self._load(self._robot_at_start)
         self.warm_up(self.robot)
         self._candidate = self.robot
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(1.0 / self.value("diagnostics_rate"), self._publish_diagnostics)
+        self.every(1.0 / self.value("diagnostics_rate"), self._publish_diagnostics)
 
     def destroy_node(self) -> None:
         """Leave the logging of libraries alone again, then destroy the node."""
@@ -146,16 +156,19 @@ class RobotNode(Node):
         for parameter in parameters:
             try:
                 if parameter.name == "robot":
-                    candidate = load_robot(self._robot_file(parameter.value))
+                    candidate = self._load(self._robot_file(parameter.value))
                     self.warm_up(candidate)
                     self._candidate = candidate
                 elif parameter.name == "service_events":
-                    _check_service_events(parameter.value)
+                    _introspection(parameter.value)
             except Exception as error:
                 self.health.refuse(f"parameter {parameter.name}", str(error))
                 self.get_logger().error(f"parameter {parameter.name} refused: {error}")
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _load(self, source: str | Path) -> Robot:
+        return load_robot(source).with_frame_prefix(self.value("frame_prefix"))
 
     def _robot_file(self, source: str) -> str | Path:
         """Return the description that a robot's new name or path stands for."""
@@ -175,7 +188,7 @@ class RobotNode(Node):
 
     def _tell_events(self, service: ServiceServer) -> None:
         """Publish as much of the calls of a service as the parameter `service_events` says."""
-        state = SERVICE_EVENTS[self.value("service_events")]
+        state = _introspection(self.value("service_events"))
         service.configure_introspection(self.get_clock(), SERVICE_QOS, state)
 
     # ------------------------------------------------------------------ for subclasses
@@ -249,6 +262,15 @@ class RobotNode(Node):
         # undecoded: messages that are left out shall cost nothing
         subscribe_raw(self, message_type, topic, take, lose, STREAM_QOS)
 
+    def every(self, period: float, work: Callable[[], None]) -> Timer:
+        """Do work again and again, also while the clock of a simulation stands still.
+
+        Args:
+            period: Time between two calls [s].
+            work: What is called.
+        """
+        return self.create_timer(period, work, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
     def header(self, frame_id: str) -> Header:
         """Return a header with the present time."""
         return Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
@@ -284,11 +306,17 @@ class RobotNode(Node):
         self._diagnostics.publish(DiagnosticArray(header=self.header(""), status=[status]))
 
 
-def _check_service_events(value: Any) -> None:
-    """Raise a ValueRangeError if the parameter `service_events` cannot be this."""
-    if value not in SERVICE_EVENTS:
+def _introspection(value: Any) -> ServiceIntrospectionState:
+    """Return the state that the parameter `service_events` asks for.
+
+    Raises:
+        ValueRangeError: If it cannot be this.
+    """
+    name = "off" if value is False else value  # as YAML reads it
+    if not isinstance(name, str) or name not in SERVICE_EVENTS:
         allowed = ", ".join(SERVICE_EVENTS)
         raise ValueRangeError(f"parameter service_events: got {value!r}; allowed: {allowed}")
+    return SERVICE_EVENTS[name]
 
 
 def _decoded(data: bytes, message_type: Any) -> Any:

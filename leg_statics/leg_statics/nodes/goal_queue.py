@@ -89,7 +89,7 @@ class GoalQueue:
         self._begin, self._failure = begin, failure
         self._goals: dict[bytes, _Goal] = {}
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix=name)
-        self._timer = node.create_timer(FEEDBACK_PERIOD, self._attend)
+        self._timer = node.every(FEEDBACK_PERIOD, self._attend)
         self._timer.cancel()
         self._server = ActionServer(
             node,

@@ -18,6 +18,7 @@ from leg_msgs_py.arrays import from_field, to_field
 from leg_msgs_py.clouds import to_cloud
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from leg_kinematics.arrays import FloatArray
@@ -39,10 +40,11 @@ from leg_statics.nodes.contacts import declare_grounds
 from leg_statics.nodes.goal_queue import GoalQueue
 from leg_statics.nodes.markers import (
     Scene,
+    deletion,
     grid_points,
     moving_markers,
-    no_workspace_marker,
     workspace_marker,
+    workspace_name,
 )
 from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.maps import map_key
@@ -105,6 +107,7 @@ class MapsNode(RobotNode):
         self._postures: dict[str, Posture] = {}
         self._workspaces: list[Any] = []
         self._drawn_at = -np.inf
+        self._shown: set[str] = set()  # namespaces of markers, of former robots too
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
         self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
@@ -204,9 +207,11 @@ class MapsNode(RobotNode):
         return to_cloud(self.header(frame_id), points, columns)
 
     def publish_map(self, leg: Leg, index_map: IndexMap) -> None:
-        """Publish a map in the base frame."""
+        """Publish a map in the base frame, without a time: who comes later shows it there, too."""
         base = self.robot.base_frame
-        self._map_publisher.publish(self.cloud(base, find_frame(self.robot, leg, base), index_map))
+        cloud = self.cloud(base, find_frame(self.robot, leg, base), index_map)
+        cloud.header = Header(frame_id=base)
+        self._map_publisher.publish(cloud)
 
     # ------------------------------------------------------------------ the action
 
@@ -253,11 +258,11 @@ class MapsNode(RobotNode):
 
     def _workspace(self, leg: Leg) -> Any:
         """Return the marker of a leg's workspace at the height of its initial foot position."""
-        header, layer = self.header(self.robot.base_frame), self.value("marker_layer")
+        header, layer = Header(frame_id=self.robot.base_frame), self.value("marker_layer")
         note = f"no workspace drawn: {leg.name}"
         self.health.notes.pop(note, None)
         if not layer or not leg.mechanism.has_point_foot:
-            return no_workspace_marker(header, leg)
+            return deletion(header, workspace_name(leg))
         try:
             key = MapKey.of(
                 leg,
@@ -269,10 +274,10 @@ class MapsNode(RobotNode):
             return workspace_marker(header, leg, self._memory.plane(key), layer)
         except LegError as error:
             self.health.notes[note] = f"parameter marker_layer: {error}"
-            return no_workspace_marker(header, leg)
+            return deletion(header, workspace_name(leg))
 
     def _publish_markers(self) -> None:
-        header = self.header(self.robot.base_frame)
+        header = Header(frame_id=self.robot.base_frame)
         friction, scale = self.value("friction_coefficient"), self.value("marker_force_scale")
         scenes = [
             Scene(leg, self._postures[leg.name], friction, scale)
@@ -280,8 +285,12 @@ class MapsNode(RobotNode):
             if leg.name in self._postures
         ]
         moving = [marker for scene in scenes for marker in moving_markers(header, scene)]
-        self._marker_publisher.publish(MarkerArray(markers=[*moving, *self._workspaces]))
-        self._drawn_at = time.monotonic()
+        markers = [*moving, *self._workspaces]
+        names = {marker.ns for marker in markers}
+        self._shown |= names
+        gone = [deletion(header, name) for name in sorted(self._shown - names)]
+        self._marker_publisher.publish(MarkerArray(markers=[*gone, *markers]))
+        self._drawn_at = time.monotonic()  # drawing takes long: the node rests after it
 
     def _attend(self, source: str, work: Any) -> None:
         """Do the work of a callback; a fault of it is recorded."""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and Foxglove show of a leg: linkage, foot, forces, and a slice of its workspace."""
+"""What RViz and Foxglove show of a leg: linkage, foot, forces, and a slice of its workspace.
+
+Markers move with the base frame, and have no time: viewers know no transforms of before they came.
+"""
 
 from __future__ import annotations
 
@@ -95,16 +98,22 @@ def workspace_marker(header: Any, leg: Leg, index_map: IndexMap, layer: str) -> 
     points = grid_points(index_map)[inside]
     values = index_map.layer(layer)[inside]
     resolution = float(index_map.x[1] - index_map.x[0]) if len(index_map.x) > 1 else 0.01
-    name = f"{leg.name}/workspace"
-    marker = _marker(header, name, Marker.CUBE_LIST, resolution, _points(leg, points), GREY)
+    marker = _marker(
+        header, workspace_name(leg), Marker.CUBE_LIST, resolution, _points(leg, points), GREY
+    )
     marker.scale.z = 0.1 * resolution
     marker.colors = [ColorRGBA(r=r, g=g, b=b, a=0.7) for r, g, b in colours(values).tolist()]
     return marker
 
 
-def no_workspace_marker(header: Any, leg: Leg) -> Any:
-    """Return the marker that takes the workspace away."""
-    return _marker(header, f"{leg.name}/workspace", Marker.CUBE_LIST, 0.01, [], GREY)
+def workspace_name(leg: Leg) -> str:
+    """Return the namespace of the marker of a leg's workspace."""
+    return f"{leg.name}/workspace"
+
+
+def deletion(header: Any, name: str) -> Any:
+    """Return the marker that takes away what is shown in a namespace."""
+    return Marker(header=header, ns=name, action=Marker.DELETE)
 
 
 def grid_points(index_map: IndexMap) -> FloatArray:
@@ -159,6 +168,7 @@ def _marker(
         scale=Vector3(x=size, y=size, z=size),
         color=ColorRGBA(**dict(zip(("r", "g", "b", "a"), color, strict=True))),
         points=list(points),
+        frame_locked=True,
     )
     marker.pose.orientation.w = 1.0
     return marker

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
 from leg_msgs.msg import EffortLimits, LegState, LegStates
 from leg_msgs_py.arrays import from_field, to_field
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -20,6 +19,7 @@ from leg_statics.joint_layout import JointLayout
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStream, StampOrder
 from leg_statics.leg_state import LegStates as States
 from leg_statics.nodes.contacts import declare_grounds
+from leg_statics.nodes.rate_limit import RateLimit
 from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.limits import limits_message
 from leg_statics.warm_up import warm_up_statics
@@ -49,7 +49,7 @@ class StaticsNode(RobotNode):
         )
         self.grounds = declare_grounds(self)
         self._stamps = StampOrder()
-        self._published_at: dict[tuple[str, ...], float] = {}
+        self._limit = RateLimit(0.0, KNOWN_LAYOUTS)
         self._limits_publisher = self.create_publisher(EffortLimits, "~/effort_limits", LATCHED)
         self._states_publisher = self.create_publisher(LegStates, "~/leg_states", STREAM_QOS.depth)
         self.robot_changed()
@@ -66,7 +66,6 @@ class StaticsNode(RobotNode):
     def robot_changed(self) -> None:
         """Forget what was derived from the old description and publish the new limits."""
         self._renew_stream()
-        self._published_at.clear()
         self.health.notes.clear()
         self._publish_limits()
 
@@ -97,8 +96,7 @@ class StaticsNode(RobotNode):
         if not self._stamps.advances(names, 10**9 * stamp.sec + stamp.nanosec):
             self.health.disorder("joint_states")
         self._note_missing(self._stream.layout(names))
-        now = time.monotonic()
-        if now - self._published_at.get(names, -np.inf) < self._least_period:
+        if not self._limit.allows(time.monotonic(), names):
             return
         states = self._stream.read(
             names,
@@ -111,15 +109,11 @@ class StaticsNode(RobotNode):
         filled = self._states_message(states)
         filled.header.stamp = stamp
         self._states_publisher.publish(filled)
-        if len(self._published_at) >= KNOWN_LAYOUTS:  # a stream whose names keep changing
-            self._published_at.clear()
-        self._published_at[names] = now
 
     def _renew_stream(self) -> None:
         """Take up the robot, its limits and the parameters of the stream."""
         self._stream = JointStream(self.robot, self.value("friction_coefficient"))
-        rate = self.value("state_rate_limit")
-        self._least_period = 1.0 / rate if rate > 0.0 else 0.0
+        self._limit.rate = self.value("state_rate_limit")
         self._messages: dict[tuple[str, ...], LegStates] = {}
 
     def _note_missing(self, layout: JointLayout) -> None:
