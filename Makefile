@@ -15,7 +15,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRI
 ROBOT ?= hexapod
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test test-lowest lint typecheck soak bench bench-compare papers clean
+.PHONY: help setup demo run test test-lowest lint typecheck soak stances bench bench-compare papers clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -50,6 +50,9 @@ $(LOWEST)/COLCON_IGNORE: requirements-lowest.txt
 
 soak: setup  ## Record a minute at 1 kHz for six legs and count what is lost
 	$(VENV_PYTHON) -m pytest -s tests/soak_recorder.py
+
+stances: setup  ## Compare the load factors of 10,000 random stances with a conic solver
+	$(VENV_PYTHON) leg_statics/test/stance_oracle.py 10000
 
 bench: setup  ## Measure speed through the public interfaces, and that of other software
 	@echo "Installing what to compare with, unless it is there ..."

@@ -10,11 +10,27 @@ from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStream
 from leg_statics.leg_state import LegStates
 from leg_statics.maps import IndexMap, line_map, plane_map, supported_layers, volume_map
+from leg_statics.stance.region import SupportRegion, margin_along, support_region
+from leg_statics.stance.stances import (
+    BestForces,
+    Load,
+    Multiples,
+    Stance,
+    Stances,
+    StanceVerdict,
+    best_forces,
+    evaluate_stances,
+    load_factor,
+    payload,
+)
+from leg_statics.stance.standing import BodyPose, robot_stance
 from leg_statics.step_length import CommonStep, Criterion, StepLength, common_step, longest_step
 from leg_statics.workspace import workspace_bounds
 
 __all__ = [
     "INDICES",
+    "BestForces",
+    "BodyPose",
     "CapacityStatus",
     "CommonStep",
     "Contact",
@@ -25,18 +41,31 @@ __all__ = [
     "IndexMap",
     "JointStream",
     "LegStates",
+    "Load",
     "LoadCapacity",
+    "Multiples",
+    "Stance",
+    "StanceVerdict",
+    "Stances",
     "StepLength",
+    "SupportRegion",
     "Verdict",
+    "best_forces",
     "common_step",
     "evaluate_footholds",
     "evaluate_indices",
+    "evaluate_stances",
     "joint_efforts",
     "line_map",
     "load_capacity",
+    "load_factor",
     "load_grounds",
     "longest_step",
+    "margin_along",
+    "payload",
     "plane_map",
+    "robot_stance",
+    "support_region",
     "supported_indices",
     "supported_layers",
     "utilisation",
