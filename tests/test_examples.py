@@ -115,6 +115,15 @@ def test_the_short_examples_run(nodes, tmp_path, name, words):
     assert words in answer.output
 
 
+def test_a_stance_is_chosen_without_nodes():
+    answer = run("05_choose_stance.py")
+    assert answer.code == 0, answer.errors
+    first, *_, best, pose, margin = answer.output.splitlines()
+    assert "let 120 kg stand" in first
+    assert float(pose.split()[-2]) > float(best.split()[3]) > 1.0  # the body helps
+    assert float(margin.split()[5]) > 0.0
+
+
 def test_without_nodes_an_example_says_how_to_start_them():
     answer = run("01_ask_one_foothold.py", ROS_DOMAIN_ID=claim_domain())
     assert answer.code == 1
