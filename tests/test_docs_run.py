@@ -20,6 +20,7 @@ PAGES = [
 ]
 WALKING = "make run GAIT=yes"
 NODES = 5  # that it starts
+IN_PROCESS = ("in_process.py", "stance.py")  # without ROS
 ALONE = "test_gait.py"  # wants the joint states to itself
 # What an example says when all is well.
 SAID = {
@@ -30,7 +31,16 @@ SAID = {
     "my_planner.py": "longest step of all six legs",
 }
 # Targets that run the tests, or run long: that make knows them is enough here.
-HEAVY_TARGETS = ("demo", "test", "test-lowest", "bench", "bench-compare", "soak", "papers")
+HEAVY_TARGETS = [
+    "demo",
+    "test",
+    "test-lowest",
+    "bench",
+    "bench-compare",
+    "soak",
+    "stances",
+    "papers",
+]
 ELSEWHERE = ("rosdep ", "colcon ", "ros2 ", "pip ")  # what only a robot's machine has
 
 
@@ -97,7 +107,7 @@ def sandbox(tmp_path_factory):
     for name in ("leg", "examples", "benchmarks"):
         (folder / name).symlink_to(ROOT / name)
     readme = ROOT / "README.md"
-    names = ("my_planner.py", "in_process.py", ALONE)
+    names = ("my_planner.py", *IN_PROCESS, ALONE)
     for name, snippet in zip(names, blocks(readme, "python"), strict=True):
         (folder / name).write_text(snippet)
     (study,) = blocks(readme, "yaml")
@@ -127,11 +137,12 @@ def test_every_console_line_runs_as_it_is_printed(page, sandbox, walking):
             execute(line, sandbox, walking)
 
 
-def test_the_snippet_without_ros_needs_no_more_than_it_says(sandbox):
+@pytest.mark.parametrize("name", IN_PROCESS)
+def test_the_snippets_without_ros_need_no_more_than_is_said(sandbox, name):
     text = (ROOT / "README.md").read_text()
     (told,) = re.findall(r"without ROS \(([\w\s,.]+) are enough\)", text)
     names = re.split(r",\s+|\s+and\s+", told)
-    program = GUARD.format(names=names, snippet=str(sandbox / "in_process.py"))
+    program = GUARD.format(names=names, snippet=str(sandbox / name))
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
