@@ -30,9 +30,11 @@ FROM_PYPI = {
     "distributed": "distributed",
     "lz4": "lz4",
     "markdown_it": "markdown-it-py",
+    "mujoco": "mujoco-core",
     "pyarrow": "pyarrow",
     "pymoo": "pymoo",
     "rosbags": "rosbags",
+    "xacro": "xacro",
 }
 
 LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"

@@ -20,6 +20,14 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
         mirrored: true                                  # optional, default false
         frame: left_front_leg                           # optional, default <leg>_leg
         joint_names: {crank_1: lf_motor_1, ...}         # optional, default <leg>_<joint>
+
+Legs of a robot model need no leg type; see `leg_kinematics.model_description`:
+
+    name: solo12
+    base_frame: base_link
+    model: {file: solo12.urdf}
+    legs:
+      FL: {foot: FL_FOOT}
 """
 
 from __future__ import annotations
@@ -50,6 +58,13 @@ from leg_kinematics.geometry import geometry_parameters
 from leg_kinematics.mechanism import Excursion, Joint, Mechanism
 from leg_kinematics.mechanisms import MECHANISMS
 from leg_kinematics.mirrored import Mirrored
+from leg_kinematics.model_description import (
+    EFFORT,
+    MODEL_LEG_SCHEMA,
+    MODEL_SCHEMA,
+    ModelDescription,
+    effort_range,
+)
 from leg_kinematics.robot import Leg, Mount, Robot
 
 MOST_LEGS = 64  # and leg types
@@ -60,42 +75,67 @@ UNITS = {
     "ratio": {"1": 1.0},
 }
 
-EFFORT = {
-    "description": "a number >= 0 (symmetric) or a pair [lower, upper]",
-    "oneOf": [{"type": "number", "minimum": 0}, PAIR],
-}
-
-ROBOT_SCHEMA = mapping_schema(
+LEG_TYPES = named_schema(
     {
-        "name": NAME,
-        "base_frame": FOREIGN_NAME,
-        "units": mapping_schema(
-            {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
-        ),
-        "leg_types": named_schema(
-            {
-                "type": "object",
-                "properties": {"mechanism": {"enum": list(MECHANISMS)}},
-                "required": ["mechanism"],
-            },
-            MOST_LEGS,
-        ),
-        "legs": named_schema(
-            mapping_schema(
-                {
-                    "type": NAME,
-                    "mount": mapping_schema({"position": VECTOR, "rpy": VECTOR}, ["position"]),
-                    "mirrored": {"type": "boolean"},
-                    "frame": FOREIGN_NAME,
-                    "joint_names": {"type": "object"},
-                },
-                ["type", "mount"],
-            ),
-            MOST_LEGS,
-        ),
+        "type": "object",
+        "properties": {"mechanism": {"enum": list(MECHANISMS)}},
+        "required": ["mechanism"],
     },
-    ["name", "base_frame", "units", "leg_types", "legs"],
+    MOST_LEGS,
 )
+TYPED_LEG = mapping_schema(
+    {
+        "type": NAME,
+        "mount": mapping_schema({"position": VECTOR, "rpy": VECTOR}, ["position"]),
+        "mirrored": {"type": "boolean"},
+        "frame": FOREIGN_NAME,
+        "joint_names": {"type": "object"},
+    },
+    ["type", "mount"],
+)
+
+
+def _check_robot(document: Document) -> None:
+    """Check all of a description but what depends on mechanisms and models.
+
+    Raises:
+        DescriptionError: If anything in it is wrong.
+    """
+    root = document.root
+    legs = root.get("legs") if isinstance(root, Mapping) else None
+    of_model = {n for n, leg in (legs or {}).items() if _is_of_model(leg)} if _is_map(legs) else ()
+    typed = not of_model or len(of_model) < len(legs or ())
+    document.check(
+        mapping_schema(
+            {
+                "name": NAME,
+                "base_frame": FOREIGN_NAME,
+                "units": mapping_schema(
+                    {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
+                ),
+                "model": MODEL_SCHEMA,
+                "leg_types": LEG_TYPES,
+                "legs": {
+                    **named_schema(TYPED_LEG, MOST_LEGS),
+                    "properties": dict.fromkeys(of_model, MODEL_LEG_SCHEMA),
+                },
+            },
+            [
+                *("name", "base_frame", "legs"),
+                *(("units", "leg_types") if typed else ()),
+                *(("model",) if of_model else ()),
+            ],
+        )
+    )
+
+
+def _is_map(value: Any) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _is_of_model(leg: Any) -> bool:
+    """Whether an entry of `legs` names a foot of the model, and not a leg type."""
+    return isinstance(leg, Mapping) and "foot" in leg
 
 
 def _leg_type_schema(mechanism: Mechanism) -> dict[str, Any]:
@@ -149,10 +189,11 @@ def leg_types_of(document: Document) -> dict[str, Leg]:
     Raises:
         DescriptionError: If anything in it is wrong.
     """
-    document.check(ROBOT_SCHEMA)
+    _check_robot(document)
     mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}
-    document.root["legs"] = {
-        name: {"type": name, "mount": mount} for name in document.root["leg_types"]
+    of_model = {n: leg for n, leg in document.root["legs"].items() if _is_of_model(leg)}
+    document.root["legs"] = of_model | {
+        name: {"type": name, "mount": mount} for name in document.root.get("leg_types", {})
     }
     return dict(robot_from_document(document).legs)
 
@@ -181,13 +222,21 @@ def robot_from_document(document: Document) -> Robot:
     Raises:
         DescriptionError: If anything in it is wrong.
     """
-    document.check(ROBOT_SCHEMA)
+    _check_robot(document)
     root = document.root
-    for name, leg_type in root["leg_types"].items():
+    types = root.get("leg_types", {})
+    for name, leg_type in types.items():
         document.check(_leg_type_schema(MECHANISMS[leg_type["mechanism"]]()), "leg_types", name)
-    units = {k: UNITS[k][v] for k, v in root["units"].items()} | {"ratio": 1.0}
-    mechanisms = {name: _mechanism(document, name, units) for name in root["leg_types"]}
-    legs = {name: _leg(document, name, mechanisms, units) for name in root["legs"]}
+    of_units = root.get("units", {"length": "m", "angle": "rad"})
+    units = {k: UNITS[k][v] for k, v in of_units.items()} | {"ratio": 1.0}
+    mechanisms = {name: _mechanism(document, name, units) for name in types}
+    model = ModelDescription(document, units) if "model" in root else None
+    legs = {
+        name: model.leg(name)
+        if model and _is_of_model(entry)
+        else _leg(document, name, mechanisms, units)
+        for name, entry in root["legs"].items()
+    }
     _check_unique_joints(document, legs)
     return Robot(root["name"], root["base_frame"], legs)
 
@@ -224,16 +273,8 @@ def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any
 
 
 def _effort_limits(document: Document, leg_type: str, joints: Sequence[Joint]) -> FloatArray:
-    limits = []
-    for joint in joints:
-        where = ("leg_types", leg_type, "effort_limits", joint.name)
-        value = document.node(*where)
-        lower, upper = value if isinstance(value, Sequence) else (-value, value)
-        if not lower <= 0.0 <= upper:
-            message = f"{[lower, upper]}: must be lower <= 0 <= upper [{joint.effort_unit}]"
-            raise document.error(message, *where)
-        limits.append((lower, upper))
-    return np.array(limits, dtype=np.float64)
+    where = ("leg_types", leg_type, "effort_limits")
+    return np.array([effort_range(document, joint, *where, joint.name) for joint in joints])
 
 
 def _leg(
@@ -268,6 +309,7 @@ def _leg(
         ),
         frame=entry.get("frame", f"{name}_leg"),
         joint_names=tuple(joint_names.get(joint, f"{name}_{joint}") for joint in joints),
+        passive_joint_names=tuple(f"{name}_{joint.name}" for joint in original.passive_joints),
         effort_limits=_effort_limits(document, leg_type, original.joints),
     )
 

@@ -76,8 +76,8 @@ class Dimensioned(Mechanism):
                 raise GeometryError(
                     f"{f.name} ({f.metadata['symbol']}) must be > 0 [{unit}], got {value}"
                 )
-        _check_ranges("joint_ranges", self.joint_ranges, self.joints)
-        _check_ranges("passive_joint_ranges", self.passive_joint_ranges, self.excursions)
+        check_ranges("joint_ranges", self.joint_ranges, self.joints)
+        check_ranges("passive_joint_ranges", self.passive_joint_ranges, self.excursions)
 
     @cached_property
     def joint_limits(self) -> FloatArray:
@@ -100,7 +100,8 @@ def _pairs(ranges: Any) -> FloatArray:
     return array if array.size else np.empty((0, 2))
 
 
-def _check_ranges(name: str, ranges: Any, joints: Sequence[Joint | Excursion]) -> None:
+def check_ranges(name: str, ranges: Any, joints: Sequence[Joint | Excursion]) -> None:
+    """Raise a GeometryError unless there is a range (lower, upper) for each joint."""
     array = _pairs(ranges)
     if array.shape != (len(joints), 2):
         raise GeometryError(

@@ -270,6 +270,23 @@ class Mechanism(ABC):
         """
         raise NotSupportedError(f"mechanism {self.name!r} does not tell constraint wrenches")
 
+    def holding_efforts(self, posture: Posture, gravity: ArrayLike) -> FloatArray:
+        """Efforts that hold the links' own weight (..., n) [N.m or N], an optional ability.
+
+        Args:
+            posture: The leg's posture (...).
+            gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²].
+
+        Raises:
+            NotSupportedError: If the masses of the links are not known.
+        """
+        raise NotSupportedError(f"the masses of mechanism {self.name!r} are not known")
+
+    @property
+    def has_masses(self) -> bool:
+        """Whether the masses of the links are known, and so what holds their weight."""
+        return False
+
     def planar_jacobian(self, posture: Posture) -> FloatArray:
         """Jacobian of the foot in the leg's plane (..., 2, 2), an optional ability.
 

@@ -100,6 +100,11 @@ class Mirrored(Mechanism):
         """Ranges of the excursions of the passive joints (e, 2) [rad or m]."""
         return self.original.passive_joint_limits
 
+    @property
+    def has_masses(self) -> bool:
+        """Whether the masses of the links are known."""
+        return self.original.has_masses
+
     def offers(self, ability: Callable[..., Any]) -> bool:
         """Tell whether the mechanism has an optional ability."""
         return self.original.offers(ability)
@@ -117,6 +122,11 @@ class Mirrored(Mechanism):
         return self.original.planar_jacobian(_reflected(posture))
 
     # ------------------------------------------------------------- what it turns round
+
+    def holding_efforts(self, posture: Posture, gravity: ArrayLike) -> FloatArray:
+        """Efforts that hold the links' own weight (..., n) [N.m or N]."""
+        vector = as_array("gravity", gravity, 3)
+        return self.original.holding_efforts(_reflected(posture), vector * VECTOR)
 
     @property
     def initial_posture(self) -> Posture:

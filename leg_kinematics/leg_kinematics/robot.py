@@ -59,6 +59,7 @@ class Leg:
         mount: The leg frame in the base frame.
         frame: Name of the leg frame.
         joint_names: Names of the actuated joints in the robot, in the mechanism's order.
+        passive_joint_names: Names of the passive joints in the robot, in the mechanism's order.
         effort_limits: Lower and upper effort of each actuator (n, 2) [N.m or N].
     """
 
@@ -68,6 +69,7 @@ class Leg:
     mount: Mount
     frame: str
     joint_names: tuple[str, ...]
+    passive_joint_names: tuple[str, ...]
     effort_limits: FloatArray
 
     @classmethod
@@ -90,12 +92,9 @@ class Leg:
             raise ShapeError(f"effort_limits must have shape (n, 2), got {limits.shape}")
         mount = Mount(np.zeros(3), np.eye(3))
         rows = np.broadcast_to(limits, (len(joints), 2)).copy()
-        return cls(mechanism.name, mechanism.name, mechanism, mount, mechanism.name, joints, rows)
-
-    @property
-    def passive_joint_names(self) -> tuple[str, ...]:
-        """Names of the passive joints in the robot, in the mechanism's order: <leg>_<joint>."""
-        return tuple(f"{self.name}_{joint.name}" for joint in self.mechanism.passive_joints)
+        name = mechanism.name
+        passive = tuple(joint.name for joint in mechanism.passive_joints)
+        return cls(name, name, mechanism, mount, name, joints, passive, rows)
 
     @property
     def mirrored(self) -> bool:

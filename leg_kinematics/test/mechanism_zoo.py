@@ -7,11 +7,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from model_legs import MODEL_LEGS
 
 from leg_kinematics import MECHANISMS, GeometryError, Mirrored, Posture, Status
 from leg_kinematics.geometry import geometry_parameters
 
-PLAIN = {name: kind() for name, kind in MECHANISMS.items()}
+PLAIN = {name: kind() for name, kind in MECHANISMS.items()} | MODEL_LEGS
 MIRRORED = {f"{n} mirrored": Mirrored(m) for n, m in PLAIN.items() if m.has_point_foot}
 ALL = PLAIN | MIRRORED
 

@@ -50,6 +50,7 @@ FOOT_BODY = {
     "six_bar": ("C", "F", "G"),
     "theo_jansen": ("C", "F", "G"),
     "gantry_hybrid": ("O''", "C'", "B'"),
+    "model": ("knee", "foot", "thigh"),
 }
 # Names in the kernels' geometry that are not the papers' symbols, by these.
 ALIASES = {
@@ -606,7 +607,8 @@ def test_an_impossible_value_names_its_field(mechanism):
                 replace(mechanism, **{f.name: value})
     for name in ("joint_ranges", "passive_joint_ranges"):
         good = getattr(mechanism, name)
-        for bad in (((0.3, 0.2),) * len(good), ((0.0, math.nan),) * len(good), good[:-1]):
+        wrong = (((0.3, 0.2),) * len(good), ((0.0, math.nan),) * len(good), good[:-1])
+        for bad in wrong if good else ():
             with pytest.raises(GeometryError, match=name):
                 replace(mechanism, **{name: bad})
 

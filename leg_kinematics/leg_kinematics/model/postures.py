@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Known postures of a leg, from which others are followed: reached from the initial one.
+
+They stand on a grid over the ranges of the actuated joints, as far as it can be reached from the
+initial posture along the grid without passing a singularity, and so all belong to its branch.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from leg_kinematics.arrays import FloatArray
+from leg_kinematics.errors import GeometryError
+from leg_kinematics.model import newton
+from leg_kinematics.model.chain import place_bodies
+from leg_kinematics.model.leg_tree import LegTree
+from leg_kinematics.model.newton import Equations
+
+SPACING = 0.25  # rad or m between neighbours of the grid, if that does not make it too large
+MOST_POSTURES = 20_000
+FEWEST, MOST_ALONG = 5, 33  # along one joint
+CELLS = 40  # along the longest side of the box in which the nearest foot is looked up
+ASSEMBLED = 1e-12  # m, what remains open in a posture that is assembled
+JOINTS_ARE_GIVEN, FEET_ARE_GIVEN = np.uint8(newton.JOINTS), np.uint8(newton.FOOT)
+RANK = 1e-9  # singular values of the equations that count as 0
+
+
+class Postures(NamedTuple):
+    """Known postures of one branch.
+
+    Attributes:
+        joints: All joint positions of each (P, N).
+        feet: Their feet (P, 3) [m].
+        signs: Signs of det C_p and det J on the branch (2,); 0 for one that means nothing.
+        axes: Grid coordinates of each actuated joint.
+        of_grid: Index of the posture nearest to each node of the grid.
+        corner: Least corner of the box of cells of feet (3,) [m].
+        cell: Sides of a cell (3,) [m].
+        of_cell: Index of the posture whose foot is nearest to each cell's centre (x, y, z).
+    """
+
+    joints: FloatArray
+    feet: FloatArray
+    signs: FloatArray
+    axes: tuple[FloatArray, ...]
+    of_grid: Any
+    corner: FloatArray
+    cell: FloatArray
+    of_cell: Any
+
+    def nearest_to_joints(self, actuated: FloatArray) -> Any:
+        """Return the index of a posture near actuated joints (m, n)."""
+        places = []
+        for axis, values in zip(self.axes, np.nan_to_num(actuated).T, strict=True):
+            step = axis[1] - axis[0]
+            place = np.rint((np.clip(values, axis[0], axis[-1]) - axis[0]) / step)
+            places.append(np.clip(place, 0, len(axis) - 1).astype(np.int64))
+        return self.of_grid[tuple(places)]
+
+    def nearest_to_feet(self, feet: FloatArray) -> Any:
+        """Return the index of a posture whose foot is near feet (m, 3)."""
+        last = np.array(self.of_cell.shape) - 1
+        place = np.clip(np.nan_to_num((feet - self.corner) / self.cell), 0.0, last)
+        x, y, z = place.astype(np.int64).T
+        return self.of_cell[x, y, z]
+
+
+def loop_state(tree: LegTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what remains open of the loops (3 L,) [m] and its derivatives (3 L, N)."""
+    room = newton.new_room(len(tree.joints), len(tree.loops), 0)
+    place_bodies(tree.chain, q, room.rotations, room.origins, room.axes)
+    newton.fill_loops(tree.chain, tree.loops, room)
+    return room.values, room.columns
+
+
+def assembled(tree: LegTree, guess: FloatArray, held: Any = ()) -> FloatArray:
+    """Return all joint positions near a guess at which the loops are closed (N,).
+
+    Args:
+        tree: The leg.
+        guess: All joint positions.
+        held: Numbers of joints that stay as guessed; all move if the loops do not close so.
+
+    Raises:
+        GeometryError: If the loops do not close near the guess.
+    """
+    free = np.setdiff1d(np.arange(len(tree.joints)), np.asarray(held, dtype=np.int64))
+    for moving in (free, np.arange(len(tree.joints))):
+        q = np.array(guess, dtype=np.float64)
+        for _ in range(200):
+            values, columns = loop_state(tree, q)
+            if np.abs(values).max(initial=0.0) <= ASSEMBLED:
+                return q
+            step = np.zeros(len(q))
+            step[moving] = np.linalg.lstsq(columns[:, moving], -values, rcond=RANK)[0]
+            largest = np.abs(step).max()
+            q += step * min(1.0, 0.3 / largest if largest > 0.0 else 1.0)
+    values, _ = loop_state(tree, np.asarray(guess, dtype=np.float64))
+    raise GeometryError(
+        f"the loops do not close: in the given posture points that must coincide are up to "
+        f"{np.abs(values).max():.3g} m apart, and no posture nearby closes them; check the "
+        "closures, or give an initial posture"
+    )
+
+
+def independent_rows(tree: LegTree, posture: FloatArray) -> FloatArray:
+    """Return the equations of the loops that the others do not imply (m,), m = N - freedoms."""
+    rng = np.random.default_rng(0)
+    matrices = []
+    for _ in range(6):  # at one posture they could depend on each other by chance
+        try:
+            near = assembled(tree, posture + rng.uniform(-0.05, 0.05, len(posture)))
+        except GeometryError:
+            continue
+        matrices.append(loop_state(tree, near)[1])
+    matrices = matrices or [loop_state(tree, posture)[1]]
+    rows: list[int] = []
+    for row in range(3 * len(tree.loops)):
+        if any(_rank(m[[*rows, row]]) > len(rows) for m in matrices):
+            rows.append(row)
+    return np.array(rows, dtype=np.float64)
+
+
+def _rank(matrix: FloatArray) -> int:
+    return int(np.linalg.matrix_rank(matrix, tol=1e-7)) if matrix.size else 0
+
+
+def known_postures(equations: Equations, limits: FloatArray, initial: FloatArray) -> Postures:
+    """Return the postures that are reached from an initial one.
+
+    Args:
+        equations: The leg.
+        limits: Ranges of the actuated joints (n, 2).
+        initial: All joint positions of the initial posture (N,), the loops closed.
+    """
+    numbers = equations.actuated.astype(np.int64)
+    n = len(numbers)
+    start = initial[numbers]
+    follow = _followed(equations)
+    own, foot, found = follow(initial[None], start[None], np.zeros(2))
+    signs = np.sign(found[0]) if n == 3 else np.array([np.sign(found[0, 0]), 0.0])
+    axes = _grid_axes(limits, start)
+    shape = tuple(map(len, axes))
+    index = np.full(shape, -1, dtype=np.int64)
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    joints, feet = [own], [foot]
+    count = 1
+    here = tuple(int(np.argmin(abs(axis - q))) for axis, q in zip(axes, start, strict=True))
+    tried = np.zeros(shape, dtype=np.bool_)
+    frontier, sources = [here], np.array([0])
+    tried[here] = True
+    while frontier:
+        goals = nodes[tuple(np.array(frontier).T)]
+        all_joints = np.concatenate(joints)
+        reached, places, determinants = follow(all_joints[sources], goals, signs)
+        good = np.isfinite(reached).all(axis=1) & np.all(determinants * signs >= 0.0, axis=1)
+        good &= np.abs(determinants[:, 1]) > newton.DEAD_CENTRE
+        joints.append(reached[good])
+        feet.append(places[good])
+        joints, feet = [np.concatenate(joints)], [np.concatenate(feet)]
+        next_frontier, next_sources = [], []
+        for node, is_good in zip(frontier, good, strict=True):
+            if not is_good:
+                continue
+            index[node] = count
+            for k in range(n):
+                for way in (-1, 1):
+                    other = (*node[:k], node[k] + way, *node[k + 1 :])
+                    if 0 <= other[k] < shape[k] and not tried[other]:
+                        tried[other] = True
+                        next_frontier.append(other)
+                        next_sources.append(count)
+            count += 1
+        frontier, sources = next_frontier, np.array(next_sources, dtype=np.int64)
+    return _looked_up(np.concatenate(joints), np.concatenate(feet), signs, axes, index)
+
+
+def _followed(equations: Equations) -> Any:
+    numbers = equations.actuated.astype(np.int64)
+
+    def follow(start: FloatArray, goal: FloatArray, signs: FloatArray) -> Any:
+        """Return joints, feet and signs; only a change of det C_p's ends the way."""
+        told = equations._replace(signs=np.array([signs[0], 0.0]))
+        q, feet, _, found, _ = newton.follow_postures(
+            *told, start, start[:, numbers], goal, JOINTS_ARE_GIVEN
+        )
+        return q, feet, found
+
+    return follow
+
+
+def _grid_axes(limits: FloatArray, start: FloatArray) -> tuple[FloatArray, ...]:
+    along = int(np.clip(MOST_POSTURES ** (1.0 / len(limits)), FEWEST, MOST_ALONG))
+    axes = []
+    for (lower, upper), q in zip(limits, start, strict=True):
+        lower, upper = max(lower, q - math.pi), min(upper, q + math.pi)
+        count = int(np.clip(math.ceil((upper - lower) / SPACING) + 1, FEWEST, along))
+        half = max(upper - lower, 1e-9) / 2.0
+        axes.append(np.linspace(lower, lower + 2.0 * half, count))
+    return tuple(axes)
+
+
+def _looked_up(
+    joints: FloatArray,
+    feet: FloatArray,
+    signs: FloatArray,
+    axes: tuple[FloatArray, ...],
+    index: Any,
+) -> Postures:
+    """Return the postures with the tables in which the nearest are found."""
+    from scipy.ndimage import distance_transform_edt  # slow to import
+    from scipy.spatial import cKDTree
+
+    if (index >= 0).any():
+        near = distance_transform_edt(index < 0, return_distances=False, return_indices=True)
+        index = index[tuple(near)]
+    else:
+        index = np.zeros_like(index)
+    lower, upper = feet.min(axis=0), feet.max(axis=0)
+    side = max(float((upper - lower).max()) / CELLS, 1e-6)
+    counts = np.maximum(np.ceil((upper - lower) / side), 1.0).astype(np.int64)
+    centres = [low + side * (np.arange(k) + 0.5) for low, k in zip(lower, counts, strict=True)]
+    grid = np.stack(np.meshgrid(*centres, indexing="ij"), axis=-1)
+    of_cell = cKDTree(feet).query(grid)[1]
+    return Postures(joints, feet, signs, axes, index, lower, np.full(3, side), of_cell)
