@@ -41,8 +41,10 @@ class Contact(NamedTuple):
         moment: Moment that the ground applies to the foot (..., 3) [N.m]; zero on hard ground.
         any_direction_moment: Magnitude of a horizontal moment of unknown direction that must be
             borne on top (...,) [N.m]: the worst case over directions, equation (27).
-        bias_efforts: Efforts that the actuators exert anyway (..., n) or one for all, such as those
-            that carry the leg's own weight, which the papers ignore [N.m or N].
+        bias_efforts: Efforts that the actuators exert anyway (..., n) or one for all, on top of
+            those that hold the leg's own weight if its masses are known [N.m or N].
+        gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²]; None for that of a level
+            body.
     """
 
     friction: ArrayLike
@@ -51,6 +53,7 @@ class Contact(NamedTuple):
     moment: ArrayLike = (0.0, 0.0, 0.0)
     any_direction_moment: ArrayLike = 0.0
     bias_efforts: ArrayLike = 0.0
+    gravity: ArrayLike | None = None
 
 
 def contact_rows(contact: Contact, n: int) -> FloatArray:
@@ -76,6 +79,7 @@ def _arrays(contact: Contact, n: int) -> Contact:
         as_array("moment", contact.moment, 3),
         as_array("any_direction_moment", contact.any_direction_moment),
         as_vectors("bias_efforts", contact.bias_efforts, n),
+        as_array("gravity", 0.0 if contact.gravity is None else contact.gravity),
     )
 
 
@@ -115,7 +119,7 @@ def check_contact(contact: Contact, n: int) -> None:
     check_normals("normal", np.asarray(contact.normal))
     for name in ("friction", "load", "any_direction_moment"):
         as_non_negative(name, getattr(contact, name))
-    for name in ("load", "moment", "any_direction_moment", "bias_efforts"):
+    for name in ("load", "moment", "any_direction_moment", "bias_efforts", "gravity"):
         array = np.asarray(getattr(contact, name))
         if not np.isfinite(array).all():
             raise ValueRangeError(

@@ -55,6 +55,7 @@ from leg_statics.contact import check_contact, contact_rows, leading_shapes
 from leg_statics.efforts import share_of_limits
 from leg_statics.indices import force_slopes
 from leg_statics.kinematics import Kinematics
+from leg_statics.weight import gravity_of, weight_efforts
 
 
 class Verdict(IntEnum):
@@ -95,11 +96,14 @@ class Footholds(NamedTuple):
         verdict: A `Verdict` each.
         posture: The solved postures.
         numbers: All else that was found, in columns (..., 9 + n); the properties name them.
+        weight_counted: Whether the actuators hold the leg's own weight, too; not if its masses are
+            not known.
     """
 
     verdict: StatusArray
     posture: Posture
     numbers: FloatArray
+    weight_counted: bool
 
     @property
     def status(self) -> StatusArray:
@@ -222,6 +226,10 @@ def _judged(leg: Leg, posture: Posture, twist_jacobian: FloatArray, contact: Con
         )
     limits = as_array("effort_limits", leg.effort_limits, n, 2)
     given = contact_rows(contact, n)
+    if mechanism.has_masses:
+        gravity = gravity_of(leg) if contact.gravity is None else contact.gravity
+        weight = weight_efforts(mechanism, posture, gravity)
+        given = _with_bias(given, weight)
     try:
         verdict, numbers = _verdicts(limits, twist_jacobian, posture.status, given)
     except ValueError:
@@ -230,7 +238,16 @@ def _judged(leg: Leg, posture: Posture, twist_jacobian: FloatArray, contact: Con
     if not verdict.size or has_code(verdict, WRONG_CONTACT):
         check_effort_limits(limits[:, 0], limits[:, 1])
         check_contact(contact, n)
-    return Footholds(verdict, posture, numbers)
+    return Footholds(verdict, posture, numbers, mechanism.has_masses)
+
+
+def _with_bias(contacts: FloatArray, efforts: FloatArray) -> FloatArray:
+    """Return rows of contacts with more efforts that the actuators exert anyway."""
+    batch = np.broadcast_shapes(contacts.shape[:-1], efforts.shape[:-1])
+    rows = np.empty((*batch, contacts.shape[-1]))
+    rows[...] = contacts
+    rows[..., OF_CONTACT:] += efforts
+    return rows
 
 
 def _verdicts(

@@ -13,6 +13,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import without_reflection
 from leg_kinematics.robot import Leg, Robot
+from leg_statics.weight import gravity_of
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class LegGroup:
         signs: Signs of the components of vectors, which tell mirrored legs (L, 3).
         lower: Least efforts (L, n) [N.m or N].
         upper: Greatest efforts (L, n) [N.m or N].
+        gravity: Gravity of a level body in the frames of the legs, reflected if they are (L, 3).
     """
 
     mechanism: Mechanism
@@ -34,6 +36,7 @@ class LegGroup:
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
+    gravity: FloatArray
 
 
 @dataclass(frozen=True)
@@ -81,4 +84,5 @@ def _leg_group(mechanism: Mechanism, legs: Sequence[Leg], column: dict[str, int]
         signs=np.array([without_reflection(leg.mechanism)[1] for leg in legs]),
         lower=np.ascontiguousarray(limits[..., 0]),
         upper=np.ascontiguousarray(limits[..., 1]),
+        gravity=np.array([gravity_of(leg) * without_reflection(leg.mechanism)[1] for leg in legs]),
     )

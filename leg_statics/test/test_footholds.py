@@ -288,6 +288,7 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
         moment=random.uniform(-3.0, 3.0, (count, 3)),
         any_direction_moment=random.uniform(0.0, 2.0, count),
         bias_efforts=random.uniform(-3.0, 3.0, (count, 3)),
+        gravity=random.normal(size=(count, 3)),
     )
     together = evaluate_footholds(LEG, feet, contact)
     for k in range(count):

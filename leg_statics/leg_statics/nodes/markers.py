@@ -21,6 +21,7 @@ from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
 from leg_statics.maps import IndexMap
+from leg_statics.weight import gravity_of, weight_efforts
 
 BAR_WIDTH = 0.008  # m
 LINE_WIDTH = 0.003  # m
@@ -75,7 +76,8 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
         cone = foot + _cone_lines(scene.friction)
         jacobian = mechanism.jacobian(posture)
         if jacobian.shape == (3, 3):
-            corners = force_polytope(jacobian, scene.leg.effort_limits)
+            weight = weight_efforts(mechanism, posture, gravity_of(scene.leg))
+            corners = force_polytope(jacobian, scene.leg.effort_limits, weight)
             polytope = foot + scene.force_scale * corners[np.ravel(EDGES)]
     shapes = (
         ("linkage", Marker.LINE_LIST, BAR_WIDTH, STEEL, linkage.points[np.ravel(ends).astype(int)]),
