@@ -21,6 +21,7 @@ setup(
     extras_require={"test": ["pytest"]},
     entry_points={
         "console_scripts": [
+            "describe_robot = leg_kinematics.describe_robot:main",
             "kinematics_node = leg_kinematics.nodes.entry_points:kinematics_node",
         ],
     },
