@@ -104,12 +104,12 @@ def test_the_best_forces_have_the_least_utilisation_that_a_conic_solver_finds():
     assert checked > 20
 
 
-def test_a_single_foot_below_the_mass_carries_its_load_capacity():
+def test_a_single_foot_without_friction_carries_its_load_capacity():
     rng = np.random.default_rng(8)
     for _ in range(20):
         jacobian, limits = rng.normal(0.0, 0.3, (3, 3)), 10.0 ** rng.uniform(1.0, 2.0, 3)
         foot = rng.normal(size=3)
-        # what hangs below the foot by a rope pulls sideways at will: the moment is free of force
+        # without friction neither the leg nor the stance has a choice of tangential force
         found = load_factor(
             Stance(foot[None], jacobian[None], -limits, limits, 0.0), Load(1.0, foot)
         )
