@@ -97,24 +97,6 @@ def terrain():
     return terrain
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("01_ask_one_foothold.py", "carries 500 N"),
-        ("02_rank_ten_thousand.py", "10000 candidates"),
-        ("03_choose_height_and_step.py", "cement"),
-    ],
-)
-def test_the_short_examples_run(nodes, tmp_path, name, words):
-    # They ask nodes without a namespace: a copy of the program asks those of this module.
-    program = tmp_path / name
-    text = (EXAMPLES / name).read_text()
-    program.write_text(text.replace("LegClient(", "LegClient(namespace='examples', "))
-    answer = run(program)
-    assert answer.code == 0, answer.errors
-    assert words in answer.output
-
-
 def test_a_stance_is_chosen_without_nodes():
     answer = run("05_choose_stance.py")
     assert answer.code == 0, answer.errors

@@ -386,13 +386,68 @@ def test_the_table_holds_the_judgements(tripod_files):
 
 def test_the_report_tells_what_matters(tripod_files):
     text = (tripod_files / "walk.md").read_text()
-    assert "Nothing is beyond its limits" in text
-    assert "Ground: cement, friction 0.4" in text
+    assert "**Within the limits in what was checked; everything was checked.**" in text
+    assert "| ground | cement, friction 0.4 |" in text
+    assert "| command | judge\\_bag " in text or "| command | judge_bag " in text
+    assert "| recorded | 2023-11-14 22:13:20 UTC to 2023-11-14 22:13:25 UTC |" in text
+    assert "/drives: motors told WARN: warm" in text
     assert "| /drives: motors | OK 4, WARN 2 | WARN at 4.001" in text
     for leg in LEGS:
         picture = tripod_files / f"walk_{leg}.png"
         assert f"![{leg}]({picture.name})" in text
         assert picture.stat().st_size > 10_000
+
+
+def test_the_report_says_first_what_could_not_be_checked(tmp_path, one_leg):
+    def without_efforts(message, content):
+        content.effort = content.effort[:0].copy()
+        if message.topic == "/left_front/wrench":
+            return [(message.topic, message.type, message.time, content)]
+        return [(message.topic, JOINT_STATE, message.time, content)]
+
+    bag = changed_bag(tmp_path / "bag", without_efforts, one_leg)
+    files = ["--table", str(tmp_path / "walk.csv"), "--report", str(tmp_path / "walk.md")]
+    assert main([str(bag), *files]) == 0
+    verdict, _, rest = (tmp_path / "walk.md").read_text().partition("## About this report")
+    assert "not everything was checked" in verdict
+    assert "Nothing of left_middle, left_rear, right_front, right_middle, right_rear" in verdict
+    assert "effort / limit, worst joint of any leg: it needs efforts in the joint states" in verdict
+    assert "load / load capacity of any leg: it needs the wrench on the foot" in verdict
+    assert "| joint range used | 1 | 1 of 6, 100 % of their joint states |" in verdict
+    assert "The worst share of a limit is" in verdict
+    moments = rest.partition("## Worst moments")[2].partition("## Queries")[0].splitlines()
+    rows = [tuple(line.split("|")[1:4]) for line in moments if line.startswith("|")]
+    assert len(rows) == len(set(rows))  # what is alike is one row
+
+
+def test_wrenches_that_are_recorded_and_not_used_are_told(tmp_path):
+    def shortened(message, content):
+        if message.time - Bag(TRIPOD).start < 200_000_000:
+            yield message.topic, message.type, message.time, content
+
+    topics = ("/joint_states", "/left_front/wrench", "/right_rear/wrench")
+    bag = changed_bag(tmp_path / "bag", shortened, topics=topics)
+    files = ["--table", str(tmp_path / "walk.csv"), "--report", str(tmp_path / "walk.md")]
+    assert main([str(bag), "--wrench", "left_front=/left_front/wrench", *files]) == 0
+    text = (tmp_path / "walk.md").read_text()
+    assert "Recorded wrenches that were not used: /right" in text
+    assert "load / load capacity of left_middle, left_rear" in text
+
+
+def test_one_joint_a_message_is_judged_as_one_message_of_all(tmp_path):
+    def in_pieces(message, content):
+        for k, name in enumerate(content.name):
+            values = (getattr(content, f)[k : k + 1] for f in ("position", "velocity", "effort"))
+            piece = TYPES.types[JOINT_STATE](content.header, [name], *values)
+            yield "/joint_states", JOINT_STATE, message.time + k, piece
+
+    wanted, _, _ = judged(Bag(TRIPOD), "hexapod")
+    found, judge, _ = judged(Bag(changed_bag(tmp_path / "bag", in_pieces)), "hexapod")
+    assert judge.tally.pieces == 300 * 18
+    assert judge.tally.judged == 300 * len(LEGS)
+    for leg in LEGS:
+        for field in STATE_FIELDS:
+            np.testing.assert_array_equal(getattr(found[leg], field), getattr(wanted[leg], field))
 
 
 def test_the_copy_has_leg_states_and_all_the_rest(tripod_files):

@@ -14,7 +14,7 @@ import pytest
 import rclpy
 from leg_msgs_py import errors
 from leg_msgs_py.client import LegClient
-from node_processes import NodeProcesses, node_names
+from node_processes import NodeProcesses, find_executable, node_names
 from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for, wait_until_ready
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -448,6 +448,40 @@ def test_run_robot_tells_when_a_node_dies():
     assert "statics ended by itself" in output
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["max_points"], "got 'max_points'; allowed: NAME:=VALUE"),
+        ([":=5"], "got ':=5'; allowed: NAME:=VALUE"),
+    ],
+)
+def test_run_robot_refuses_what_is_no_parameter(arguments, words):
+    tool = subprocess.run(
+        [sys.executable, ROOT / "tools" / "run_robot.py", *arguments],
+        capture_output=True,
+        text=True,
+    )
+    assert tool.returncode == 2
+    assert words in tool.stderr
+
+
+def test_a_node_helps_and_refuses_what_it_does_not_know():
+    node = find_executable("leg_statics", "gait_node")
+    told = subprocess.run([node, "--help"], capture_output=True, text=True)
+    assert told.returncode == 0
+    for words in (
+        "read-only)\n      Length of a stance [m]",
+        "robot  (default 'hexapod')",
+        "/joint_states  sensor_msgs/msg/JointState",
+        "/left_front/wrench  geometry_msgs/msg/WrenchStamped",
+    ):
+        assert words in told.stdout
+    assert "parameter_events" not in told.stdout
+    refused = subprocess.run([node, "--robot", "walker"], capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert "unrecognized arguments: --robot walker" in refused.stderr
+
+
 def test_run_robot_refuses_a_robot_that_is_not_there():
     tool = subprocess.run(
         [sys.executable, ROOT / "tools" / "run_robot.py", "--robot", "decapod"],
@@ -478,11 +512,12 @@ def test_the_demo_shows_everything_and_ends_well(tmp_path):
 def test_the_launch_file_is_valid_and_starts_the_same_nodes():
     tree = ast.parse((ROOT / "config" / "launch" / "leg_suite.launch.py").read_text())
     functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
-    assert functions == ["generate_launch_description"]
+    assert functions == ["generate_launch_description", "_node"]
     assert "nodes.yaml" in ast.unparse(tree)
-    nodes = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")["nodes"]
-    assert tuple(node["name"] for node in nodes) == node_names()
-    for node in nodes:
+    known = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")
+    assert tuple(node["name"] for node in known["nodes"]) == node_names()
+    assert [node["name"] for node in known["companions"]] == ["designs", "gait"]
+    for node in (*known["nodes"], *known["companions"]):
         package, executable = node["package"], node["executable"]
         setup = (ROOT / package / "setup.py").read_text()
         assert f'"{executable} = {package}.nodes.entry_points:{executable}"' in setup

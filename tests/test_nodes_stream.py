@@ -157,6 +157,26 @@ def test_a_message_of_another_robot_gives_nothing(stream):
     assert stream.ask([], []) is None
 
 
+def test_joint_states_of_another_robot_are_told_until_its_own_come(stream, suite):
+    # a robot that is read anew has had no joint states yet
+    assert set_parameter(stream.node, "statics", "robot", "hexapod").successful
+    stream.send(["arm_1", "arm_2"])
+    told = wait_for(lambda: stream.value("joint_states of another robot"))
+    assert "name no joint of hexapod but arm_1, arm_2" in told
+    assert stream.diagnostics.level == DiagnosticStatus.WARN
+    assert list(stream.ask(LEFT_FRONT)) == ["left_front"]
+    wait_for(lambda: not stream.value("joint_states of another robot"))
+
+
+def test_one_joint_a_message_updates_its_leg(stream):
+    whole = stream.ask(LEFT_FRONT, JOINTS)["left_front"]
+    for joint, position in zip(LEFT_FRONT[:-1], JOINTS[:-1], strict=True):
+        stream.send([joint], [position])
+    state = stream.ask(LEFT_FRONT[-1:], JOINTS[-1:])["left_front"]
+    assert state.foot_position.tolist() == whole.foot_position.tolist()
+    assert state.load_capacity == whole.load_capacity
+
+
 def test_a_leg_that_lacks_a_joint_is_not_updated_and_named(stream):
     names = LEFT_FRONT[:2] + RIGHT_REAR
     assert list(stream.ask(names)) == ["right_rear"]

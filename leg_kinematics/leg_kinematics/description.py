@@ -20,6 +20,13 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
         mirrored: true                                  # optional, default false
         frame: left_front_leg                           # optional, default <leg>_leg
         joint_names: {crank_1: lf_motor_1, ...}         # optional, default <leg>_<joint>
+        drives: {crank_1: {scale: -1, zero: 5}, ...}    # optional, see below
+
+What a drive tells in joint states is the joint position in rad or m, unless `drives` says
+otherwise: position = scale · (told - zero). `scale` (default 1) is a number without unit, negative
+for a drive that counts the other way round; `zero` (default 0) is what the drive tells at joint
+position zero, in the file's unit of the joint. Efforts are divided by the scale. Limits, services
+and maps speak of the joints themselves.
 
 Legs of a robot model need no leg type; see `leg_kinematics.model_description`:
 
@@ -65,7 +72,7 @@ from leg_kinematics.model_description import (
     ModelDescription,
     effort_range,
 )
-from leg_kinematics.robot import Leg, Mount, Robot
+from leg_kinematics.robot import Drives, Leg, Mount, Robot
 
 MOST_LEGS = 64  # and leg types
 
@@ -90,6 +97,7 @@ TYPED_LEG = mapping_schema(
         "mirrored": {"type": "boolean"},
         "frame": FOREIGN_NAME,
         "joint_names": {"type": "object"},
+        "drives": {"type": "object"},
     },
     ["type", "mount"],
 )
@@ -311,7 +319,29 @@ def _leg(
         joint_names=tuple(joint_names.get(joint, f"{name}_{joint}") for joint in joints),
         passive_joint_names=tuple(f"{name}_{joint.name}" for joint in original.passive_joints),
         effort_limits=_effort_limits(document, leg_type, original.joints),
+        drives=_drives(document, name, original.joints, units),
     )
+
+
+def _drives(
+    document: Document, leg: str, joints: Sequence[Joint], units: Mapping[str, float]
+) -> Drives | None:
+    """Return what the drives of a leg tell, if the description says anything of it."""
+    entry = document.node("legs", leg).get("drives")
+    if not entry:
+        return None
+    drive = mapping_schema({"scale": NUMBER, "zero": NUMBER}, ())
+    schema = mapping_schema({joint.name: drive for joint in joints}, ())
+    document.check(schema, "legs", leg, "drives")
+    scale, zero = np.ones(len(joints)), np.zeros(len(joints))
+    for k, joint in enumerate(joints):
+        told = entry.get(joint.name, {})
+        scale[k] = told.get("scale", 1.0)
+        zero[k] = told.get("zero", 0.0) * units[joint.dimension]
+        if scale[k] == 0.0:
+            message = "0: the scale of a drive must not be 0"
+            raise document.error(message, "legs", leg, "drives", joint.name, "scale")
+    return Drives(scale, zero)
 
 
 def _check_unique_joints(document: Document, legs: Mapping[str, Leg]) -> None:

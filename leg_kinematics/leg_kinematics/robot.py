@@ -49,6 +49,39 @@ class Mount:
 
 
 @dataclass(frozen=True)
+class Drives:
+    """What the drives of a leg tell in joint states, if it is not the joint positions themselves.
+
+    A cylinder may tell its stroke, a motor count from another zero or the other way round:
+
+        position = scale (told - zero)        effort = told effort / scale, as power is the same
+
+    Attributes:
+        scale: Of each joint (n,), not 0; negative if the drive counts the other way round.
+        zero: What each drive tells at joint position zero (n,), in the unit of what it tells.
+    """
+
+    scale: FloatArray
+    zero: FloatArray
+
+    def positions(self, told: FloatArray) -> FloatArray:
+        """Return joint positions (..., n) [rad or m]."""
+        return self.scale * (told - self.zero)
+
+    def velocities(self, told: FloatArray) -> FloatArray:
+        """Return joint velocities (..., n) [rad/s or m/s]."""
+        return self.scale * told
+
+    def efforts(self, told: FloatArray) -> FloatArray:
+        """Return joint efforts (..., n) [N.m or N]."""
+        return told / self.scale
+
+    def told_positions(self, positions: FloatArray) -> FloatArray:
+        """Return what the drives tell at joint positions (..., n)."""
+        return positions / self.scale + self.zero
+
+
+@dataclass(frozen=True)
 class Leg:
     """One leg of a robot.
 
@@ -61,6 +94,7 @@ class Leg:
         joint_names: Names of the actuated joints in the robot, in the mechanism's order.
         passive_joint_names: Names of the passive joints in the robot, in the mechanism's order.
         effort_limits: Lower and upper effort of each actuator (n, 2) [N.m or N].
+        drives: What joint states tell of the joints; None for the joint positions themselves.
     """
 
     name: str
@@ -71,6 +105,7 @@ class Leg:
     joint_names: tuple[str, ...]
     passive_joint_names: tuple[str, ...]
     effort_limits: FloatArray
+    drives: Drives | None = None
 
     @classmethod
     def of(cls, mechanism: Mechanism, effort_limits: ArrayLike = (-np.inf, np.inf)) -> Leg:

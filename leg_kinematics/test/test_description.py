@@ -206,3 +206,32 @@ def test_a_missing_file_and_an_unknown_robot_are_told(tmp_path):
     (tmp_path / "latin.yaml").write_bytes(b"name: \xff")
     with pytest.raises(DescriptionError, match=r"latin.yaml"):
         load_robot(tmp_path / "latin.yaml")
+
+
+def test_drives_tell_positions_by_scale_and_zero(edited):
+    leg = "  left_front:\n    type: optimised\n"
+    drives = "    drives: {crank_1: {scale: -2, zero: 90}, crank_3: {zero: -10}}\n"
+    found = load_robot(edited(leg, leg + drives))
+    assert found.leg("left_rear").drives is None
+    drives = found.leg("left_front").drives
+    np.testing.assert_allclose(drives.scale, [-2.0, 1.0, 1.0])
+    np.testing.assert_allclose(drives.zero, np.radians([90.0, 0.0, -10.0]))
+    told = np.radians([[80.0, 5.0, 0.0]])
+    np.testing.assert_allclose(drives.positions(told), np.radians([[20.0, 5.0, 10.0]]))
+    np.testing.assert_allclose(drives.told_positions(drives.positions(told)), told)
+    power = drives.efforts(np.ones(3)) * drives.velocities(np.ones(3))
+    np.testing.assert_allclose(power, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("drives", "message"),
+    [
+        ("{crank_9: {scale: 1}}", r"unknown key 'crank_9'"),
+        ("{crank_1: {sign: -1}}", r"unknown key 'sign'; allowed: scale, zero"),
+        ("{crank_1: {scale: 0}}", r"drives\.crank_1\.scale: 0: the scale of a drive must not be 0"),
+    ],
+)
+def test_wrong_drives_are_told(edited, drives, message):
+    leg = "  left_front:\n    type: optimised\n"
+    with pytest.raises(DescriptionError, match=message):
+        load_robot(edited(leg, f"{leg}    drives: {drives}\n"))

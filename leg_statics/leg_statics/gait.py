@@ -51,9 +51,10 @@ class GaitCycle(NamedTuple):
 
     Attributes:
         names: Joint names (N), in the order of the robot.
-        positions: Of the joints (T, N) [rad or m].
-        velocities: Of the joints (T, N) [rad/s or m/s].
-        efforts: That hold the feet (T, N) [N.m or N]; 0 where nothing pushes.
+        positions: Of the joints, as their drives tell them (T, N) [rad or m].
+        velocities: Of the joints, as their drives tell them (T, N) [rad/s or m/s].
+        efforts: That hold the feet, as the drives tell them (T, N) [N.m or N]; 0 where nothing
+            pushes.
         forces: Ground reaction on each foot, in its leg frame (T, 3) [N]; of point feet only.
         stride: Length of a stance [m]; NaN if all legs have one crank, which fixes it.
         load: Vertical force on a standing foot [N].
@@ -85,17 +86,20 @@ def gait_cycle(robot: Robot, gait: Gait, samples: int) -> GaitCycle:
         (_least_capacity(leg, postures[leg.name], reactions[leg.name]) for leg in feet), default=0.0
     )
     forces = {name: load * reaction for name, reaction in reactions.items()}
-    rates = [_rates(leg, phases[name], stride) / gait.period for name, leg in robot.legs.items()]
-    efforts = [_efforts(leg, postures[name], forces.get(name)) for name, leg in robot.legs.items()]
-    return GaitCycle(
-        robot.effort_limits()[0],
-        np.concatenate([posture.joint_positions for posture in postures.values()], axis=-1),
-        np.concatenate(rates, axis=-1),
-        np.concatenate(efforts, axis=-1),
-        forces,
-        stride,
-        load,
+    told = [
+        _told(
+            leg,
+            postures[name].joint_positions,
+            _rates(leg, phases[name], stride) / gait.period,
+            _efforts(leg, postures[name], forces.get(name)),
+        )
+        for name, leg in robot.legs.items()
+    ]
+    positions, velocities, efforts = (
+        np.concatenate(part, axis=-1) for part in zip(*told, strict=True)
     )
+    names = robot.effort_limits()[0]
+    return GaitCycle(names, positions, velocities, efforts, forces, stride, load)
 
 
 def phase_shifts(robot: Robot) -> dict[str, float]:
@@ -214,3 +218,13 @@ def _efforts(leg: Leg, posture: Posture, force: FloatArray | None) -> FloatArray
     mechanism = leg.mechanism
     jacobian, angular = mechanism.jacobian(posture), mechanism.angular_jacobian(posture)
     return joint_efforts(jacobian, angular, force)
+
+
+def _told(
+    leg: Leg, positions: FloatArray, rates: FloatArray, efforts: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return positions, velocities and efforts as the drives of a leg tell them (T, n)."""
+    if leg.drives is None:
+        return positions, rates, efforts
+    scale = leg.drives.scale
+    return leg.drives.told_positions(positions), rates / scale, efforts * scale

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import without_reflection
-from leg_kinematics.robot import Leg, Robot
+from leg_kinematics.robot import Drives, Leg, Robot
 from leg_statics.weight import gravity_of
 
 
@@ -28,6 +28,7 @@ class LegGroup:
         lower: Least efforts (L, n) [N.m or N].
         upper: Greatest efforts (L, n) [N.m or N].
         gravity: Gravity of a level body in the frames of the legs, reflected if they are (L, 3).
+        drives: What their drives tell, for all legs (L, n); None for the joint positions.
     """
 
     mechanism: Mechanism
@@ -37,6 +38,7 @@ class LegGroup:
     lower: FloatArray
     upper: FloatArray
     gravity: FloatArray
+    drives: Drives | None = None
 
 
 @dataclass(frozen=True)
@@ -85,4 +87,15 @@ def _leg_group(mechanism: Mechanism, legs: Sequence[Leg], column: dict[str, int]
         lower=np.ascontiguousarray(limits[..., 0]),
         upper=np.ascontiguousarray(limits[..., 1]),
         gravity=np.array([gravity_of(leg) * without_reflection(leg.mechanism)[1] for leg in legs]),
+        drives=_common_drives(legs),
     )
+
+
+def _common_drives(legs: Sequence[Leg]) -> Drives | None:
+    """Return what the drives of several legs tell, as arrays of all of them (L, n)."""
+    if all(leg.drives is None for leg in legs):
+        return None
+    plain = np.ones_like(legs[0].effort_limits[:, 0])
+    scale = np.array([plain if leg.drives is None else leg.drives.scale for leg in legs])
+    zero = np.array([0.0 * plain if leg.drives is None else leg.drives.zero for leg in legs])
+    return Drives(scale, zero)

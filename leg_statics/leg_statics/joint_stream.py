@@ -93,11 +93,7 @@ class JointStream:
             JointStateError: If a name appears more than once or a length is wrong.
         """
         layout = self.layout(names)
-        fields = [
-            _field("position", position, len(names), may_be_empty=False),
-            _field("velocity", velocity, len(names), may_be_empty=True),
-            _field("effort", effort, len(names), may_be_empty=True),
-        ]
+        fields = joint_fields(len(names), position, velocity, effort)
         parts = [self._group_states(group, *fields) for group in layout.groups]
         if len(parts) == 1:
             return parts[0]
@@ -106,13 +102,12 @@ class JointStream:
     def _group_states(
         self, group: LegGroup, position: FloatArray, velocity: FloatArray, effort: FloatArray
     ) -> LegStates:
-        return leg_states(
-            group,
-            self.friction,
-            position[..., group.columns],
-            _rows(velocity, group),
-            _rows(effort, group),
-        )
+        positions, rates = position[..., group.columns], _rows(velocity, group)
+        efforts = _rows(effort, group)
+        if group.drives is not None:
+            positions = group.drives.positions(positions)
+            rates, efforts = group.drives.velocities(rates), group.drives.efforts(efforts)
+        return leg_states(group, self.friction, positions, rates, efforts)
 
 
 class StampOrder:
@@ -134,6 +129,21 @@ class StampOrder:
         last = self._last.get(names, 0)
         self._last[names] = stamp
         return stamp == 0 or stamp > last
+
+
+def joint_fields(
+    count: int, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
+) -> list[FloatArray]:
+    """Return position, velocity and effort of joints as arrays (..., count), or (..., 0) if empty.
+
+    Raises:
+        JointStateError: If a length is wrong; only velocity and effort may be empty.
+    """
+    return [
+        _field("position", position, count, may_be_empty=False),
+        _field("velocity", velocity, count, may_be_empty=True),
+        _field("effort", effort, count, may_be_empty=True),
+    ]
 
 
 def _field(name: str, values: ArrayLike, count: int, *, may_be_empty: bool) -> FloatArray:

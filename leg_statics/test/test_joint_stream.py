@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from leg_kinematics import Robot, Status, ValueRangeError, load_robot
-from leg_kinematics.robot import Leg
+from leg_kinematics.robot import Drives, Leg
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
 from leg_statics.indices import evaluate_indices, supported_indices
@@ -174,3 +176,29 @@ def test_stamps_of_one_stream_must_increase():
     assert order.advances(a, 0)  # no stamp at all
     assert order.advances(a, 0)
     assert order.advances(a, 6)
+
+
+def test_drives_that_count_otherwise_give_the_states_of_the_joints():
+    robot = load_robot("hexapod")
+    generator = np.random.default_rng(5)
+    told = {}
+    for name in ("left_front", "right_rear"):  # one plain leg beside each of the same geometry
+        scale = generator.choice([-1.0, 0.5, -2.0], 3)
+        told[name] = Drives(scale, generator.uniform(-1.0, 1.0, 3))
+    legs = {
+        name: replace(leg, drives=told.get(name)) if name in told else leg
+        for name, leg in robot.legs.items()
+    }
+    names, _ = robot.effort_limits()
+    position = generator.uniform(-0.2, 0.2, len(names))
+    velocity, effort = generator.normal(size=(2, len(names)))
+    wanted = JointStream(robot, 0.4).read(names, position, velocity, effort)
+    for name, drives in told.items():
+        columns = [names.index(joint) for joint in robot.leg(name).joint_names]
+        position[columns] = drives.told_positions(position[columns])
+        velocity[columns] /= drives.scale
+        effort[columns] *= drives.scale
+    found = JointStream(replace(robot, legs=legs), 0.4).read(names, position, velocity, effort)
+    assert found.legs == wanted.legs
+    for one, other in zip(found[2:], wanted[2:], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)

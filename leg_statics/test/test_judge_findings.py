@@ -83,6 +83,31 @@ def test_what_is_beyond_a_limit_is_counted_and_what_is_at_it_is_not():
     assert (extent.known, extent.beyond) == (4, 2)
 
 
+def test_a_foot_in_the_air_bears_nothing_and_one_without_a_wrench_might():
+    findings = Findings(load_robot("hexapod"), 0.4, contact_force=10.0)
+    force = np.full((4, 3), np.nan)
+    force[:3, 2] = [100.0, 0.0, 9.9]
+    capacity = np.array([500.0, 50.0, 60.0, 400.0])
+    findings.add([judgement("left_front", np.arange(4), force=force, load_capacity=capacity)])
+    quantity = next(q for q in findings.quantities if q.name == "load_capacity")
+    extent = findings.extent("left_front", quantity)
+    assert (extent.known, extent.least) == (2, 400.0)
+    assert findings.samples("left_front", quantity) == 2
+    assert {moment.value for moment in findings.worst(quantity)} <= {400.0, 500.0}
+    curves = findings.curves["left_front"]
+    shown = curves.high[:, curves.names.index("load_capacity")]
+    np.testing.assert_array_equal(shown, [500.0, np.nan, np.nan, 400.0])
+
+
+def test_an_envelope_is_in_the_order_of_time_whatever_the_order_of_its_samples():
+    envelope = Envelope(("a",))
+    for times in ([5, 3, 9], [1, 4, 12]):
+        times = np.array(times)
+        envelope.add(times, times[:, None].astype(float))
+    np.testing.assert_array_equal(envelope.begin, [1, 3, 4, 5, 9, 12])
+    np.testing.assert_array_equal(envelope.high[:, 0], envelope.begin)
+
+
 def test_a_component_tells_its_worst_level_and_since_when():
     log = DiagnosticLog()
     for time, level in enumerate([0, 1, 2, 1, 2, 0]):

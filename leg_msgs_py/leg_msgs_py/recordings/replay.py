@@ -134,7 +134,7 @@ class Replay:
         Raises:
             BagError: If it is no recording.
             ReplayError: If it lacks a topic or has another definition of a type than is installed,
-                or if nodes are missing or end.
+                if nodes are missing or end, or if nothing at all is answered.
             UnknownTypeError: If a type is not installed.
         """
         if not rate > 0.0:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 # How far the player is ahead of the answers, on each topic, when it plays as fast as possible: less
 # than the five messages that a subscriber with the profile of sensor data keeps.
 WINDOW = 4
+MOST_SILENCES = 10  # waits in vain in which nothing at all has been answered yet
 PATIENCE = 1.0  # answers come sooner, on a machine that is not too busy [s]
 
 Stamp: TypeAlias = bytes  # as it is serialised
@@ -50,6 +51,13 @@ class Flow:
         self._waiting: deque[tuple[str, Stamp]] = deque()  # topic and stamp, in the order sent
         self._topics: Counter[str] = Counter()  # how many of each wait
         self._stamps: Counter[Stamp] = Counter()
+        self._answered = False
+        self._silences = 0
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Whether so many inputs found no answer, and none did, that none is to be expected."""
+        return not self._answered and self._silences >= MOST_SILENCES
 
     def send(self, topic: str, stamp: Stamp) -> None:
         """Note an input."""
@@ -61,6 +69,7 @@ class Flow:
     def answer(self, stamp: Stamp) -> None:
         """Note an output: inputs up to the one with its stamp are dealt with."""
         with self._changed:
+            self._answered = True
             done = not self._stamps[stamp]
             while not done:
                 topic, first = self._waiting.popleft()
@@ -82,6 +91,7 @@ class Flow:
         with self._changed:
             while not is_over():
                 if not self._changed.wait(self._patience):
+                    self._silences += 1
                     for each in (self._waiting, self._topics, self._stamps):
                         each.clear()
 

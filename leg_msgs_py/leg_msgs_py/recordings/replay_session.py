@@ -124,6 +124,7 @@ class Session:
     def play(self, messages: Iterator[BagMessage], rate: float) -> None:
         """Publish messages, and wait for the last outputs."""
         pace = Pace(rate)
+        sent = 0
         before: int | None = None
         for message in messages:
             self._check_nodes()
@@ -137,10 +138,19 @@ class Session:
             pace.wait_until(message.time)
             if math.isinf(rate):
                 self._flow.wait_for_room(message.topic)
+            if self._flow.is_hopeless:
+                break
             self._flow.send(message.topic, stamp_of(message.data))
+            sent += 1
             self._inputs[message.topic].publish(message.data)
         self._flow.wait_for_all()
         self._check_nodes()
+        if sent and self.outputs and not any(output.data for output in self.outputs.values()):
+            raise ReplayError(
+                f"nothing came on {', '.join(self.outputs)} for {sent} messages on "
+                f"{', '.join(self._inputs)}: do they name the joints of the robot that the nodes "
+                "serve? /diagnostics tells what the nodes make of them"
+            )
 
     def _check_nodes(self) -> None:
         for topic, output in self.outputs.items():

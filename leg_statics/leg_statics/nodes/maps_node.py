@@ -108,6 +108,7 @@ class MapsNode(RobotNode):
         self._workspaces: list[Any] = []
         self._drawn_at = -np.inf
         self._shown: set[str] = set()  # namespaces of markers, of former robots too
+        self._moved: dict[str, float] = {}  # positions of joints since the legs were drawn
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
         self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
@@ -234,9 +235,6 @@ class MapsNode(RobotNode):
 
     def joint_states(self, message: Any) -> None:
         """Draw the legs whose joints are in the message, if somebody looks."""
-        now = time.monotonic()
-        if now - self._drawn_at < 1.0 / self.value("marker_rate"):
-            return
         if not self._marker_publisher.get_subscription_count():
             return
         if len(message.position) != len(message.name):
@@ -244,10 +242,15 @@ class MapsNode(RobotNode):
                 f"position: got {len(message.position)} values; allowed: {len(message.name)}, one "
                 "a name"
             )
-        positions = dict(zip(message.name, message.position, strict=True))
+        self._moved |= dict(zip(message.name, message.position, strict=True))
+        if time.monotonic() - self._drawn_at < 1.0 / self.value("marker_rate"):
+            return
+        positions, self._moved = self._moved, {}  # drivers may tell one joint a message
         for leg in self._legs():
             if all(joint in positions for joint in leg.joint_names):
-                joints = [positions[joint] for joint in leg.joint_names]
+                joints = np.array([positions[joint] for joint in leg.joint_names])
+                if leg.drives is not None:
+                    joints = leg.drives.positions(joints)
                 self._postures[leg.name] = leg.mechanism.forward(joints)
         self._publish_markers()
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from leg_msgs.msg import EffortLimits, LegState, LegStates
@@ -16,6 +17,7 @@ from leg_kinematics.nodes.node_process import run
 from leg_kinematics.nodes.robot_node import STREAM_QOS, RobotNode
 from leg_kinematics.robot import Robot
 from leg_statics.joint_layout import JointLayout
+from leg_statics.joint_pieces import JointPieces
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStream, StampOrder
 from leg_statics.leg_state import LegStates as States
 from leg_statics.nodes.contacts import declare_grounds
@@ -24,6 +26,7 @@ from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.limits import limits_message
 from leg_statics.warm_up import warm_up_statics
 
+FOREIGN = "joint_states of another robot"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -95,15 +98,21 @@ class StaticsNode(RobotNode):
         names, stamp = tuple(message.name), message.header.stamp
         if not self._stamps.advances(names, 10**9 * stamp.sec + stamp.nanosec):
             self.health.disorder("joint_states")
-        self._note_missing(self._stream.layout(names))
+        position, velocity, effort = map(
+            from_field, (message.position, message.velocity, message.effort)
+        )
+        layout = self._stream.layout(names)
+        missing = layout.missing
+        if missing and not layout.legs:  # one joint a message, maybe
+            whole = self._pieces.add(time.monotonic_ns(), names, position, velocity, effort)
+            missing = self._pieces.lacking
+            if whole is not None:
+                names, position, velocity, effort = whole
+                layout = self._stream.layout(names)
+        self._note_missing(names, layout, missing)
         if not self._limit.allows(time.monotonic(), names):
             return
-        states = self._stream.read(
-            names,
-            from_field(message.position),
-            from_field(message.velocity),
-            from_field(message.effort),
-        )
+        states = self._stream.read(names, position, velocity, effort)
         if not states.legs:
             return
         filled = self._states_message(states)
@@ -114,12 +123,26 @@ class StaticsNode(RobotNode):
         """Take up the robot, its limits and the parameters of the stream."""
         self._stream = JointStream(self.robot, self.value("friction_coefficient"))
         self._limit.rate = self.value("state_rate_limit")
+        self._pieces = JointPieces(self.robot)
         self._messages: dict[tuple[str, ...], LegStates] = {}
 
-    def _note_missing(self, layout: JointLayout) -> None:
+    def _note_missing(
+        self, names: tuple[str, ...], layout: JointLayout, missing: Mapping[str, tuple[str, ...]]
+    ) -> None:
+        """Tell which legs a message does not update, and whether only foreign joints ever came."""
+        if layout.legs:
+            self.health.notes.pop(FOREIGN, None)
+        elif not self._messages:
+            known, _ = self.robot.effort_limits()
+            if not {*known} & {*names}:
+                self.health.notes[FOREIGN] = (
+                    f"joint_states name no joint of {self.robot.name} but "
+                    f"{', '.join(names[:3])}, ...; its joints are {', '.join(known[:3])}, ..."
+                )
+                self.log.warning(FOREIGN, self.health.notes[FOREIGN])
         for leg in layout.legs:
             self.health.notes.pop(f"leg not updated: {leg}", None)
-        for leg, joints in layout.missing.items():
+        for leg, joints in missing.items():
             text = f"{leg} is not updated: joint_states lack {', '.join(joints)}"
             self.health.notes[f"leg not updated: {leg}"] = text
             self.log.warning(f"{leg} not updated", text)

@@ -25,6 +25,7 @@ from leg_kinematics.nodes.requests import find_frame
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.status import Status
 from leg_statics.efforts import joint_efforts, utilisation
+from leg_statics.joint_pieces import JointPieces, WholeLegs
 from leg_statics.joint_stream import JointStateError, JointStream, StampOrder
 from leg_statics.leg_state import LegStates
 from leg_statics.weight import gravity_of, weight_efforts
@@ -134,6 +135,7 @@ class Tally:
     Attributes:
         judged: Joint states that updated a leg.
         refused: Messages that could not be used, by reason.
+        pieces: Joint states that name no leg's joints in full; put together they may be judged.
         foreign: Joint states that name no joint of the robot.
         foreign_names: What one of them names.
         missing: Messages that did not update a leg because joints lack, by leg and joints.
@@ -146,6 +148,7 @@ class Tally:
 
     judged: int = 0
     refused: Counter[str] = field(default_factory=Counter)
+    pieces: int = 0
     foreign: int = 0
     foreign_names: tuple[str, ...] = ()
     missing: Counter[str] = field(default_factory=Counter)
@@ -214,6 +217,7 @@ class BagJudge:
         self._bag = bag
         self._friction = friction
         self._stream = JointStream(robot, friction)
+        self._pieces = JointPieces(robot)
         self._order = StampOrder()
         self._contact_force = contact_force
         self._legs_by_topic = {topic: robot.leg(leg) for leg, topic in topics.wrenches.items()}
@@ -262,6 +266,8 @@ class BagJudge:
                 leg = self.robot.leg(name)
                 columns = [names.index(joint) for joint in leg.joint_names]
                 efforts = effort[:, columns] if effort.shape[1] else None
+                if efforts is not None and leg.drives is not None:
+                    efforts = leg.drives.efforts(efforts)
                 judgements.append(self._judgement(leg, rows, states, k, efforts))
         return judgements
 
@@ -274,17 +280,39 @@ class BagJudge:
         names, stamp = tuple(joints.name), _nanoseconds(joints.header.stamp)
         if not self._order.advances(names, stamp):
             self.tally.disordered += 1
-        effort = joints.effort
+        try:
+            told = self._whole_legs(message.time, names, joints)
+        except JointStateError as error:
+            self.tally.refuse(f"{self.topics.joint_states}: {error}")
+            return
+        if told is None:
+            return
+        names, position, velocity, effort = told
         if self.topics.efforts:
             effort = np.array([self._held(self._efforts, name, message.time) for name in names])
         wrenches = {
             leg.name: self._held(self._wrenches, leg.name, message.time)
             for leg in self._legs_by_topic.values()
         }
-        row = _Row(number, message.time, stamp, joints.position, joints.velocity, effort, wrenches)
-        key = (names, len(joints.position), len(joints.velocity), len(effort))
+        row = _Row(number, message.time, stamp, position, velocity, effort, wrenches)
+        key = (names, len(position), len(velocity), len(effort))
         self._waiting.setdefault(key, []).append(row)
         self._count += 1
+
+    def _whole_legs(self, time: int, names: tuple[str, ...], joints: Any) -> WholeLegs | None:
+        """Return what a message tells, after what the pieces before it told if it is one itself.
+
+        Raises:
+            JointStateError: If a name appears more than once, or the lengths of a piece are wrong.
+        """
+        layout = self._stream.layout(names)
+        if layout.legs or not layout.missing:
+            return WholeLegs(names, joints.position, joints.velocity, joints.effort)
+        self.tally.pieces += 1
+        whole = self._pieces.add(time, names, joints.position, joints.velocity, joints.effort)
+        for leg, missing in self._pieces.lacking.items():
+            self.tally.missing[f"{leg} lacks {', '.join(missing)}"] += 1
+        return whole
 
     def _take_efforts(self, message: BagMessage) -> None:
         joints = self._bag.decode(message)

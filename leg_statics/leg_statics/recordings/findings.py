@@ -2,7 +2,8 @@
 """What stands out in a judged recording, gathered in constant memory while it is read.
 
 For every leg: how far each quantity goes and how often beyond its limit, the worst moments, and
-the curves to draw as envelopes, whose bins merge by twos when they become too many.
+the curves to draw as envelopes, whose bins merge by twos when they become too many. What only a
+standing foot has to bear is left out while its wrench tells that it is in the air.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from leg_statics.recordings.bag_judge import Judgement
 
 WINDOW = 500_000_000  # of several bad moments in this time only the worst is told [ns]
 MOST_MOMENTS = 5  # told of each quantity
+NOT_OK = "pose not OK"  # curve that is known where a pose is not OK
 MOST_BINS = 2000  # of an envelope: more than a diagram has pixels
 
 
@@ -35,6 +37,8 @@ class Quantity:
         unit: Its unit; "" for a pure number.
         worse: Whether a high or a low value is worse.
         limit: Beyond it the leg fails or slips; None if it has no limit.
+        stance: Whether it counts only while the foot stands, as far as that is known.
+        needs: What must be recorded for it besides joint positions; "" for nothing.
     """
 
     name: str
@@ -42,6 +46,8 @@ class Quantity:
     unit: str
     worse: Literal["high", "low"]
     limit: float | None = None
+    stance: bool = False
+    needs: str = ""
 
     @property
     def sign(self) -> float:
@@ -51,16 +57,24 @@ class Quantity:
 
 def watched_quantities(friction: float) -> tuple[Quantity, ...]:
     """Return what is watched on a ground with this friction coefficient."""
+    efforts, wrench = "efforts in the joint states", "the wrench on the foot"
+    bare = (
+        ("utilisation", "effort / limit, worst joint", 1.0, False, efforts),
+        ("required_utilisation", "effort needed / limit, worst joint", 1.0, True, wrench),
+        ("load_share", "load / load capacity", 1.0, True, wrench),
+        ("friction_used", "friction used by the foot", friction, True, wrench),
+        ("rated_friction", "rated friction mu_e", friction, True, ""),
+        ("rated_friction_full", "rated friction mu_e,xy", friction, True, ""),
+        ("range_use", "joint range used", 1.0, False, ""),
+        ("passive_range_use", "passive joint range used", 1.0, False, ""),
+    )
     return (
-        Quantity("utilisation", "effort / limit, worst joint", "", "high", 1.0),
-        Quantity("load_capacity", "load capacity", "N", "low"),
-        Quantity("rated_friction", "rated friction mu_e", "", "high", friction),
-        Quantity("rated_friction_full", "rated friction mu_e,xy", "", "high", friction),
-        Quantity("range_use", "joint range used", "", "high", 1.0),
-        Quantity("passive_range_use", "passive joint range used", "", "high", 1.0),
+        *(
+            Quantity(name, label, "", "high", limit, stance, needs)
+            for name, label, limit, stance, needs in bare
+        ),
+        Quantity("load_capacity", "load capacity", "N", "low", stance=True),
         Quantity("condition_number", "condition number", "", "high"),
-        Quantity("load_share", "load / load capacity", "", "high", 1.0),
-        Quantity("friction_used", "friction used by the foot", "", "high", friction),
     )
 
 
@@ -100,6 +114,7 @@ class Findings:
     Args:
         robot: The robot.
         friction: Friction coefficient of the ground.
+        contact_force: A foot with less vertical force is in the air [N].
 
     Attributes:
         quantities: What is watched.
@@ -108,7 +123,9 @@ class Findings:
         curves: Curves of each leg.
     """
 
-    def __init__(self, robot: Robot, friction: float) -> None:
+    def __init__(self, robot: Robot, friction: float, contact_force: float = 10.0) -> None:
+        self.contact_force = contact_force
+        self._standing: Counter[str] = Counter()
         self.quantities = watched_quantities(friction)
         self.statuses: dict[str, Counter[Status]] = {leg: Counter() for leg in robot.legs}
         self.extents: dict[tuple[str, str], Extent] = {}
@@ -125,8 +142,9 @@ class Findings:
             numbers, counts = np.unique(judgement.status, return_counts=True)
             for number, count in zip(numbers, counts, strict=True):
                 self.statuses[judgement.leg][Status(number)] += int(count)
+            self._standing[judgement.leg] += int(np.sum(~self._in_air(judgement)))
             for quantity in self.quantities:
-                values = getattr(judgement, quantity.name)
+                values = self._values(judgement, quantity)
                 self._note_extent(judgement.leg, quantity, values)
                 self._note_moments(judgement, quantity, values)
             curves = self._curves(judgement)
@@ -141,6 +159,21 @@ class Findings:
     def extent(self, leg: str, quantity: Quantity) -> Extent:
         """Return the extent of a quantity."""
         return self.extents.get((leg, quantity.name), Extent())
+
+    def samples(self, leg: str, quantity: Quantity) -> int:
+        """Return for how many joint states a quantity counts."""
+        return self._standing[leg] if quantity.stance else self.statuses[leg].total()
+
+    def _in_air(self, judgement: Judgement) -> NDArray[np.bool_]:
+        """Tell where the wrench tells that the foot is in the air (T,)."""
+        return np.asarray(judgement.force[:, 2] < self.contact_force)
+
+    def _values(self, judgement: Judgement, quantity: Quantity) -> FloatArray:
+        """Return the values of a quantity that count, NaN for the others (T,)."""
+        values: FloatArray = getattr(judgement, quantity.name)
+        if values.ndim > 1:
+            values = np.max(values, axis=-1)  # the worst joint
+        return np.where(self._in_air(judgement), np.nan, values) if quantity.stance else values
 
     def _note_extent(self, leg: str, quantity: Quantity, values: FloatArray) -> None:
         known = values[~np.isnan(values)]
@@ -171,9 +204,8 @@ class Findings:
 
     def _curves(self, judgement: Judgement) -> dict[str, FloatArray]:
         """Return the values to draw by name."""
-        curves = {quantity.name: getattr(judgement, quantity.name) for quantity in self.quantities}
-        curves["distance_to_limits"] = 1.0 - judgement.range_use
-        curves["passive_distance_to_limits"] = 1.0 - judgement.passive_range_use
+        curves = {quantity.name: self._values(judgement, quantity) for quantity in self.quantities}
+        curves[NOT_OK] = np.where(judgement.status == Status.OK, np.nan, 1.0)
         curves["force_z"] = judgement.force[:, 2]
         for k, joint in enumerate(self._joints[judgement.leg]):
             curves[f"joint_utilisation {joint}"] = judgement.joint_utilisation[:, k]
@@ -213,20 +245,29 @@ class Envelope:
         self._size = 1  # samples in a new bin
 
     def add(self, times: NDArray[np.int64], values: FloatArray) -> None:
-        """Take up samples at times (T,) [ns] with values (T, K)."""
+        """Take up samples at times (T,) [ns] with values (T, K), in any order."""
+        order = np.argsort(times, kind="stable")
+        times, values = times[order], values[order]
         starts = np.arange(0, len(times), self._size)
         ends = np.append(starts[1:], len(times)) - 1
         self.begin = np.concatenate([self.begin, times[starts]])
         self.end = np.concatenate([self.end, times[ends]])
         self.low = np.concatenate([self.low, np.fmin.reduceat(values, starts)])
         self.high = np.concatenate([self.high, np.fmax.reduceat(values, starts)])
+        if np.any(np.diff(self.begin) < 0):  # joint states with other names are judged apart
+            self._sort()
         while len(self.begin) > MOST_BINS:
             self._merge()
+
+    def _sort(self) -> None:
+        order = np.argsort(self.begin, kind="stable")
+        self.begin, self.end = self.begin[order], self.end[order]
+        self.low, self.high = self.low[order], self.high[order]
 
     def _merge(self) -> None:
         """Make one bin of each two."""
         starts = np.arange(0, len(self.begin), 2)
-        self.end = self.end[np.minimum(starts + 1, len(self.end) - 1)]
+        self.end = np.maximum.reduceat(self.end, starts)
         self.begin = self.begin[starts]
         self.low = np.fmin.reduceat(self.low, starts)
         self.high = np.fmax.reduceat(self.high, starts)

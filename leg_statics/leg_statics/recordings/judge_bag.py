@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import shutil
 import sys
 import tempfile
@@ -186,6 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for in a wrong way ends with exit code 2.
     """
     options = make_parser().parse_args(arguments)
+    options.command = shlex.join(["judge_bag", *(sys.argv[1:] if arguments is None else arguments)])
     print_on_any_terminal()
     try:
         for path in _run(options):
@@ -235,10 +237,11 @@ def _run(options: argparse.Namespace) -> list[Path]:
         judge,
         ground,
         friction,
-        Findings(robot, friction),
+        Findings(robot, friction, options.contact_force),
         queries,
         QueryFindings(),
         DiagnosticLog(),
+        options.command,
     )
     with _drafts(outputs) as drafts:
         with ExitStack() as stack:

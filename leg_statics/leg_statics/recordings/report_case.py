@@ -25,6 +25,7 @@ class Case(NamedTuple):
         queries: The judge of queries.
         query_findings: What stands out in queries.
         diagnostics: The components' own words.
+        command: The command line that judged it.
     """
 
     bag: Bag
@@ -35,3 +36,4 @@ class Case(NamedTuple):
     queries: QueryJudge
     query_findings: QueryFindings
     diagnostics: DiagnosticLog
+    command: str

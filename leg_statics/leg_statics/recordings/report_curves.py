@@ -10,10 +10,17 @@ from matplotlib.ticker import LogFormatter
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.nodes.service import Service
-from leg_statics.recordings.findings import Envelope
+from leg_statics.recordings.findings import NOT_OK, Envelope
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; every curve has its own dashes.
 STYLES = (("#0072B2", "-"), ("#D55E00", "--"), ("#009E73", "-."), ("#CC79A7", ":"))
+BEYOND = "#B00020"  # what marks values beyond a limit
+FRICTIONS = {
+    "rated_friction": "rated friction mu_e",
+    "rated_friction_full": "rated friction mu_e,xy",
+    "friction_used": "friction used by the foot",
+}
+RANGES = {"range_use": "actuated joints", "passive_range_use": "passive joints"}
 BREAK = 20  # a pause of so many usual bins interrupts a curve
 
 
@@ -50,30 +57,35 @@ def draw_leg(curves: Envelope, start: int, friction: float, *, title: str = "") 
         title: Title of the figure.
     """
     figure = Figure(figsize=(9.0, 10.0), layout="constrained")
-    effort, load, slope, distance, condition = figure.subplots(5, 1, sharex=True)
+    effort, load, slope, used, condition = figure.subplots(5, 1, sharex=True)
     bands = _Bands(curves, start)
 
     measured = bands.known("joint_utilisation ")
     source = "joint_utilisation " if measured else "required_utilisation "
     for style, name in zip(_styles(), bands.known(source), strict=False):
         bands.draw(effort, name, name.removeprefix(source), style)
+        bands.mark(effort, name, 1.0)
     effort.axhline(1.0, color="black", linewidth=0.8)
     effort.set_ylabel("effort / limit" if measured else "effort needed / limit")
 
     bands.draw(load, "load_capacity", "load capacity", STYLES[0])
     bands.draw(load, "force_z", "vertical ground reaction", STYLES[1])
+    bands.mark_where(load, "force_z", "load_share", 1.0)
     load.set_ylabel("load [N]")
 
-    bands.draw(slope, "rated_friction", "rated friction mu_e", STYLES[0])
-    bands.draw(slope, "rated_friction_full", "rated friction mu_e,xy", STYLES[1])
-    bands.draw(slope, "friction_used", "friction used", STYLES[2])
+    for style, (name, label) in zip(STYLES, FRICTIONS.items(), strict=False):
+        bands.draw(slope, name, label, style)
+        bands.mark(slope, name, friction)
     slope.axhline(friction, color="black", linewidth=0.8, label="the ground's friction")
     slope.set_ylabel("friction")
 
-    bands.draw(distance, "distance_to_limits", "actuated joints", STYLES[0])
-    bands.draw(distance, "passive_distance_to_limits", "passive joints", STYLES[1])
-    distance.axhline(0.0, color="black", linewidth=0.8)
-    distance.set_ylabel("distance to limits")
+    for style, (name, label) in zip(STYLES, RANGES.items(), strict=False):
+        bands.draw(used, name, label, style)
+        bands.mark(used, name, 1.0)
+    bands.mark_where(used, NOT_OK, NOT_OK, 0.0, label=NOT_OK, marker="x")
+    used.axhline(1.0, color="black", linewidth=0.8)
+    used.set_ylim(bottom=0.0)
+    used.set_ylabel("range used")
 
     bands.draw(condition, "condition_number", "condition number", STYLES[0])
     condition.set_yscale("log")
@@ -81,7 +93,7 @@ def draw_leg(curves: Envelope, start: int, friction: float, *, title: str = "") 
         ticks(LogFormatter(labelOnlyBase=False, minor_thresholds=(1.0, 0.5)))
     condition.set_ylabel("condition number")
     condition.set_xlabel("time [s]")
-    for axes in (effort, load, slope, distance, condition):
+    for axes in (effort, load, slope, used, condition):
         axes.grid(color="0.9")
         if axes.get_legend_handles_labels()[0]:
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
@@ -131,6 +143,36 @@ class _Bands:
                 marker=marker,
                 label=text,
             )
+
+    def mark(self, axes: Axes, name: str, limit: float) -> None:
+        """Mark where a curve is above a limit."""
+        self.mark_where(axes, name, name, limit)
+
+    def mark_where(
+        self,
+        axes: Axes,
+        name: str,
+        judged: str,
+        limit: float,
+        label: str = "beyond the limit",
+        marker: str = "v",
+    ) -> None:
+        """Mark a curve where another one is above a limit."""
+        values = self._high[:, self._names.index(name)]
+        with np.errstate(invalid="ignore"):
+            beyond = self._high[:, self._names.index(judged)] > limit
+        if not np.any(beyond):
+            return
+        known = axes.get_legend_handles_labels()[1]
+        axes.plot(
+            self._times[beyond],
+            values[beyond],
+            color=BEYOND,
+            linestyle="",
+            marker=marker,
+            markersize=4.0,
+            label=None if label in known else label,
+        )
 
 
 def _finite(values: FloatArray) -> FloatArray:

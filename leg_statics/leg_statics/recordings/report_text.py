@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
 
 from leg_kinematics.status import Status
 from leg_statics.footholds import Verdict
+from leg_statics.recordings.checks import Check, complaints, gaps, limit_checks
 from leg_statics.recordings.diagnostic_log import level_name
-from leg_statics.recordings.findings import Findings, Quantity
+from leg_statics.recordings.findings import Findings, Moment, Quantity
 from leg_statics.recordings.query_judge import Query, QueryFindings, QueryTally
 from leg_statics.recordings.report_case import Case
 
@@ -25,6 +29,8 @@ LEGEND = (
     "Load capacity: greatest vertical ground reaction within the effort limits on this ground. "
     "Rated friction: what the ground must offer at full efforts, along the walking direction "
     "(mu_e) and in both horizontal directions (mu_e,xy).",
+    "Feet whose wrench tells that they are in the air are left out of loads, capacities and "
+    "frictions.",
     "The leg's own weight and dynamics are left out, as in the statics node.",
     "Answers to planners' queries are found anew, with this robot, these grounds and the recorded "
     "effort limits. They are the same if no number is off by more than 1e-9, relative or absolute.",
@@ -41,8 +47,11 @@ def report_text(case: Case, pictures: Mapping[str, str]) -> str:
     clock, judged = _Clock(case.bag.start), case.judge.tally.judged
     parts = [
         f"# Judgement of {_cell(case.bag.path.name)}",
-        f"Robot: {case.judge.robot.name}. Ground: {case.ground}, friction {case.friction:g}.",
-        _bullets(headlines(case)),
+        *_verdict(case, clock),
+        "## About this report",
+        _about(case),
+        "## How to read it",
+        _bullets(LEGEND),
         "## Recording",
         *_recording(case),
         "## Joint states",
@@ -53,17 +62,82 @@ def report_text(case: Case, pictures: Mapping[str, str]) -> str:
         "## Diagnostics",
         *_diagnostics(case, clock),
         "## Curves",
-        "Bands span the least and the greatest value of successive samples; distances are 0 at the "
-        "limit.",
+        "Bands span the least and the greatest value of successive samples; triangles mark what is "
+        "beyond a limit.",
         *(f"### {name}\n\n![{name}]({link})" for name, link in pictures.items()),
-        "## How to read it",
-        _bullets(LEGEND),
     ]
     return "\n\n".join(parts) + "\n"
 
 
+def _verdict(case: Case, clock: _Clock) -> list[str]:
+    """Return what was checked, what could not be, and the worst share of a limit."""
+    checks = limit_checks(case)
+    lines = [_conclusion(case, checks, clock)]
+    told = headlines(case)
+    lines += [_bullets(told)] if told else []
+    rows = [
+        (
+            check.quantity.label,
+            f"{check.limit:g}",
+            f"{len(check.legs)} of {len(case.findings.statuses)}, "
+            f"{100.0 * check.known:.0f} % of their joint states",
+            f"{check.share:.3f}",
+            f"{check.worst.leg}, {clock.at(check.worst.time)}",
+            ", ".join(check.beyond) or "none",
+        )
+        for check in checks
+        if check.worst is not None
+    ]
+    if rows:
+        heads = ("checked", "limit", "legs", "worst share", "where, when [s]", "legs beyond it")
+        lines.append(_table(heads, rows))
+    unchecked = [_cell(gap) for gap in gaps(case)]
+    lines += ["**Not checked:**", _bullets(unchecked)] if unchecked else []
+    told = [_cell(complaint) for complaint in complaints(case)]
+    lines += ["**The recorded diagnostics complain:**", _bullets(told)] if told else []
+    return lines
+
+
+def _conclusion(case: Case, checks: Sequence[Check], clock: _Clock) -> str:
+    known = [check for check in checks if check.worst is not None]
+    beyond = [check for check in known if check.beyond]
+    if not known:
+        return "**No leg was checked against a limit.**"
+    worst = max(known, key=lambda check: check.share)
+    assert worst.worst is not None
+    share = (
+        f"The worst share of a limit is {worst.share:.3f}: {worst.quantity.label} of "
+        f"{worst.worst.leg}, {clock.at(worst.worst.time)}."
+    )
+    if beyond:
+        return f"**Beyond limits: {', '.join(check.quantity.label for check in beyond)}.** {share}"
+    whole = "everything was checked" if not any(gaps(case)) else "not everything was checked"
+    return f"**Within the limits in what was checked; {whole}.** {share}"
+
+
+def _about(case: Case) -> str:
+    """Return what was judged, when, how and by what."""
+    bag = case.bag
+    rows = [
+        ("recording", str(bag.path.resolve())),
+        ("recorded", f"{_date(bag.start)} to {_date(bag.end)}"),
+        ("robot", case.judge.robot.name),
+        ("ground", f"{case.ground}, friction {case.friction:g}"),
+        ("judged", _date(time.time_ns())),
+        ("command", case.command),
+        ("version", f"leg_statics {importlib.metadata.version('leg_statics')}"),
+    ]
+    return _table(("what", "which"), rows)
+
+
+def _date(nanoseconds: int) -> str:
+    """Return a time in UTC, to the second."""
+    date = datetime.fromtimestamp(nanoseconds // 10**9, tz=timezone.utc)
+    return date.strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
 def headlines(case: Case) -> list[str]:
-    """Return what matters most, one sentence each."""
+    """Return what stands out, one sentence each."""
     clock, tally = _Clock(case.bag.start), case.judge.tally
     lines = [
         f"**Damaged: {_cell(damage.file)}**: {_cell(damage.reason)}; {damage.messages} messages "
@@ -77,15 +151,6 @@ def headlines(case: Case) -> list[str]:
         if bad:
             names = ", ".join(f"{count} {status.name}" for status, count in sorted(bad.items()))
             lines.append(f"Poses of {leg} that are not OK: {names}.")
-    for quantity in case.findings.quantities:
-        extents = {leg: case.findings.extent(leg, quantity) for leg in case.findings.statuses}
-        legs = [leg for leg, extent in extents.items() if extent.beyond]
-        if legs and quantity.limit is not None:
-            worst = case.findings.worst(quantity)[0]
-            lines.append(
-                f"**Beyond {quantity.limit:g}: {quantity.label}** of {', '.join(legs)}; "
-                f"at worst {_number(worst.value)} ({worst.leg}, {clock.at(worst.time)})."
-            )
     for what, queries in _standing_out(case.query_findings):
         if queries:
             first = queries[0]
@@ -93,7 +158,7 @@ def headlines(case: Case) -> list[str]:
                 f"{what}, the first {first.service} of {_cell(first.legs) or 'all legs'} at "
                 f"{clock.at(first.time)}."
             )
-    return lines or ["Nothing is beyond its limits."]
+    return lines
 
 
 def _recording(case: Case) -> list[str]:
@@ -126,6 +191,8 @@ def _inputs(case: Case, clock: _Clock) -> list[str]:
         lines[0] += f" Mean rate {rate:.1f} Hz."
     if tally.disordered:
         lines.append(f"{tally.disordered} had a stamp not after the one before, but were judged.")
+    if tally.pieces:
+        lines.append(f"{tally.pieces} named joints of a leg in part, and were put together.")
     if tally.limit_changes:
         lines.append(f"Effort limits changed {tally.limit_changes} times; those in force counted.")
     if tally.foreign:
@@ -158,11 +225,15 @@ def _legs(case: Case) -> list[str]:
 
 
 def _moments(case: Case, clock: _Clock) -> list[str]:
-    rows = [
-        (_limit_text(quantity), _number(moment.value), moment.leg, clock.at(moment.time))
-        for quantity in case.findings.quantities
-        for moment in case.findings.worst(quantity)
-    ]
+    rows = []
+    for quantity in case.findings.quantities:
+        alike: dict[tuple[str, str], list[Moment]] = {}
+        for moment in case.findings.worst(quantity):
+            alike.setdefault((_number(moment.value), moment.leg), []).append(moment)
+        for (value, leg), moments in alike.items():
+            more = f" and {len(moments) - 1} more alike" if len(moments) > 1 else ""
+            first = min(moment.time for moment in moments)
+            rows.append((_limit_text(quantity), value, leg, clock.at(first) + more))
     return [_table(("quantity", "value", "leg", "when [s]"), rows)]
 
 
