@@ -421,8 +421,10 @@ def test_the_report_says_first_what_could_not_be_checked(tmp_path, one_leg):
 
 
 def test_wrenches_that_are_recorded_and_not_used_are_told(tmp_path):
+    start = Bag(TRIPOD).start
+
     def shortened(message, content):
-        if message.time - Bag(TRIPOD).start < 200_000_000:
+        if message.time - start < 200_000_000:
             yield message.topic, message.type, message.time, content
 
     topics = ("/joint_states", "/left_front/wrench", "/right_rear/wrench")
