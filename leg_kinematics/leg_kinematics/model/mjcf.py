@@ -87,8 +87,8 @@ class _Reader:
         mass = None if name in self.without_mass else float(model.body_mass[k])
         self.links[name] = ModelLink(name, mass, model.body_ipos[k].copy())
         joints = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
-        types = [model.jnt_type[j] for j in joints]
-        if self.mujoco.mjtJoint.mjJNT_FREE in types:
+        types = [int(model.jnt_type[j]) for j in joints]
+        if int(self.mujoco.mjtJoint.mjJNT_FREE) in types:
             return  # a base
         parent = self.bodies[model.body_parentid[k]]
         position, rotation = model.body_pos[k].copy(), _matrix(model.body_quat[k])
@@ -104,17 +104,20 @@ class _Reader:
         self._fix(name, parent, position - rotation @ anchor, rotation)
 
     def _joint(self, j: int, parent: str, position: FloatArray, rotation: FloatArray) -> ModelJoint:
-        model, kinds = self.model, self.mujoco.mjtJoint
+        model = self.model
+        hinge, slide = map(
+            int, (self.mujoco.mjtJoint.mjJNT_HINGE, self.mujoco.mjtJoint.mjJNT_SLIDE)
+        )
         name = model.joint(j).name or f"joint_{j}"
-        kind = model.jnt_type[j]
-        if kind not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
+        kind = int(model.jnt_type[j])
+        if kind not in (hinge, slide):
             raise DescriptionError(
                 f"{self.path}: joint {name!r} of body {self.bodies[model.jnt_bodyid[j]]!r}: type "
                 "ball; allowed: hinge, slide"
             )
         axis = model.jnt_axis[j].copy()
         reference = float(model.qpos0[model.jnt_qposadr[j]])
-        if kind == kinds.mjJNT_HINGE:
+        if kind == hinge:
             quaternion = np.zeros(4)
             self.mujoco.mju_axisAngle2Quat(quaternion, axis, -reference)
             rotation = rotation @ _matrix(quaternion)
@@ -125,7 +128,7 @@ class _Reader:
             limits = float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1])
         return ModelJoint(
             name=name,
-            type="revolute" if kind == kinds.mjJNT_HINGE else "prismatic",
+            type="revolute" if kind == hinge else "prismatic",
             parent=parent,
             child=f"{name}.link",
             rotation=rotation,
@@ -141,7 +144,7 @@ class _Reader:
         model = self.model
         lower = upper = 0.0
         for k in range(model.nu):
-            of_joint = model.actuator_trntype[k] == self.mujoco.mjtTrn.mjTRN_JOINT
+            of_joint = model.actuator_trntype[k] == int(self.mujoco.mjtTrn.mjTRN_JOINT)
             if not of_joint or model.actuator_trnid[k, 0] != j:
                 continue
             gear = float(model.actuator_gear[k, 0])
@@ -171,19 +174,20 @@ class _Reader:
         )  # fmt: skip
 
     def _closure(self, k: int) -> Closure:
-        model, kinds = self.model, self.mujoco.mjtEq
+        model = self.model
+        connect, weld = map(int, (self.mujoco.mjtEq.mjEQ_CONNECT, self.mujoco.mjtEq.mjEQ_WELD))
         place = f"{self.path}: equality {model.equality(k).name or k}"
         first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        data, kind = model.eq_data[k], model.eq_type[k]
-        if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+        data, kind = model.eq_data[k], int(model.eq_type[k])
+        if kind not in (connect, weld):
             raise DescriptionError(f"{place}: allowed: connect, weld")
-        if model.eq_objtype[k] == self.mujoco.mjtObj.mjOBJ_SITE:
+        if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
             one, other = (model.site(s).name for s in (first, second))
-            points = FRAME if kind == kinds.mjEQ_WELD else FRAME[:1]
+            points = FRAME if kind == weld else FRAME[:1]
             turns = [_matrix(model.site_quat[s]) for s in (first, second)]
             return Closure(one, points @ turns[0].T, other, points @ turns[1].T, place)
         one, other = self.bodies[first], self.bodies[second]
-        if kind == kinds.mjEQ_CONNECT:
+        if kind == connect:
             return Closure(one, data[None, 0:3].copy(), other, data[None, 3:6].copy(), place)
         points = data[3:6] + FRAME @ _matrix(data[6:10]).T
         return Closure(one, points, other, FRAME, place)
