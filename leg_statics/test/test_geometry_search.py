@@ -10,12 +10,14 @@ import pytest
 
 from leg_kinematics import load_robot
 from leg_statics.design.designs import evaluate_design
+from leg_statics.design.search import study_file
 from leg_statics.design.search.design_table import Design, TableError
 from leg_statics.design.search.geometry_search import EvenSample, GeometrySearch, SearchError
 from leg_statics.design.search.jobs import SearchJob
 from leg_statics.design.search.report import winner_robot, write_results
 from leg_statics.design.search.study_file import load_study
 from leg_statics.design.search.workers import LocalWorkers, Workers
+from leg_statics.grounds import Ground, Grounds
 
 CHEAP = """\
 version: 1
@@ -118,6 +120,23 @@ def test_a_larger_budget_goes_on(study, tmp_path):
     assert (outcome.progress.recalled, outcome.progress.evaluated) == (96, 120)
     with pytest.raises(SearchError, match=r"differs .* in: method"):
         run(study(), tmp_path / "out")
+
+
+def test_a_search_by_the_name_of_a_ground_goes_on_only_with_the_friction_that_it_began_with(
+    study, tmp_path, monkeypatch
+):
+    named = study("method:", "conditions: {ground: cement}\nmethod:")
+    run(named, tmp_path / "out", on_design=stop_after(10))
+    assert run(named, tmp_path / "out", on_design=stop_after(20)).progress.recalled == 10
+    other = Grounds({"cement": Ground("cement", 0.2, 0.7)})
+    monkeypatch.setattr(study_file, "load_grounds", lambda: other)
+    changed = study("method:", "conditions: {ground: cement}\nmethod:")
+    with pytest.raises(SearchError, match=r"friction: 0.4; ground 'cement' has friction: 0.2 now"):
+        run(changed, tmp_path / "out")
+    (tmp_path / "out" / "ground.yaml").unlink()
+    with pytest.raises(SearchError, match="does not tell the friction"):
+        run(named, tmp_path / "out")
+    assert len(table(tmp_path / "out").splitlines()) == 1 + 20
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from itertools import product
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching, wrapped_angles
 from leg_kinematics.errors import GeometryError
@@ -180,7 +180,7 @@ class CrankLinkage(Dimensioned):
         q = as_array("joint_positions", joint_positions, 1)
         foot, closure, status = self._solve(q, self._sides(assembly_mode))
         posture = Posture(q, closure, foot, status)
-        limited = np.ptp(self.passive_joint_limits, axis=-1) < TURN - LIMIT_TOLERANCE
+        limited = self._limited_excursions
         if limited.any():
             excursions = self.passive_joint_excursions(posture)[..., limited]
             lower, upper = self.passive_joint_limits[limited].T
@@ -193,8 +193,22 @@ class CrankLinkage(Dimensioned):
             )
         return posture
 
+    @property
+    def _limited_excursions(self) -> NDArray[np.bool_]:
+        """Which passive joints have limits (p,)."""
+        return np.asarray(np.ptp(self.passive_joint_limits, axis=-1) < TURN - LIMIT_TOLERANCE)
+
+    @property
+    def _is_limited(self) -> bool:
+        """Whether any joint has limits."""
+        turns = np.ptp(self.joint_limits[0]) >= TURN - LIMIT_TOLERANCE
+        return not turns or bool(self._limited_excursions.any())
+
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the crank angle at which the foot passes nearest to a position.
+
+        Within limits it is the nearest pass that keeps them, or an end of the crank's range, if one
+        is within `reach_tolerance`.
 
         Args:
             foot_position: Wanted foot in the leg frame (..., 3) [m].
@@ -208,10 +222,31 @@ class CrankLinkage(Dimensioned):
         passes = self.nearest_crank_angles(foot, assembly_mode)
         reached = passes.distances[..., 0] <= self.reach_tolerance
         q = np.where(reached, passes.crank_angles[..., 0], np.nan)[..., None]
+        if self._is_limited:
+            q = self._within_limits(foot, passes, q, assembly_mode)
+            reached = np.isfinite(q[..., 0])
         posture = self.forward(q, assembly_mode)
         missed = np.where(np.isfinite(foot).all(axis=-1), UNREACHABLE, INVALID_INPUT)
         status = np.where(reached, posture.status, missed).astype(np.uint8)
         return posture._replace(status=status)
+
+    def _within_limits(
+        self, foot: FloatArray, passes: Passes, default: FloatArray, assembly_mode: str
+    ) -> FloatArray:
+        """Return the crank angle (..., 1) that keeps all limits and brings the foot nearest.
+
+        It is the default where none does within `reach_tolerance`.
+        """
+        ends = np.broadcast_to(self.joint_limits[0], (*foot.shape[:-1], 2))
+        angles = np.concatenate([passes.crank_angles, ends], axis=-1)
+        tried = self.forward(angles[..., None], assembly_mode)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is far enough
+            distances = np.linalg.norm(tried.foot_position - foot[..., None, :], axis=-1)
+        kept = (tried.status == OK) & (distances <= self.reach_tolerance)
+        nearest = np.argmin(np.where(kept, distances, np.inf), axis=-1, keepdims=True)
+        angle = np.take_along_axis(angles, nearest, -1)
+        chosen: FloatArray = np.where(kept.any(axis=-1, keepdims=True), angle, default)
+        return chosen
 
     def nearest_crank_angles(self, foot_position: ArrayLike, assembly_mode: str = "") -> Passes:
         """Return all passes of the foot near a position: local minima of the distance.

@@ -34,7 +34,8 @@ from leg_statics.design.search.workers import Workers
 
 Entry = TypeVar("Entry")
 
-TABLE, STUDY, ROBOT = "designs.csv", "study.yaml", "robot.yaml"  # files of a results folder
+# Files of a results folder; the last holds the friction of the ground that the study names.
+TABLE, STUDY, ROBOT, GROUND = "designs.csv", "study.yaml", "robot.yaml", "ground.yaml"
 CHUNK = 8  # designs that a worker is given at once
 MOST_SAMPLED = 4000  # designs for the pictures
 NUMBERS = re.compile(r"(?<!\w)-?\d[\d.e+-]*")
@@ -302,7 +303,7 @@ def evaluate_designs(task: DesignTask, designs: Sequence[FloatArray]) -> list[De
 def open_table(study: Study, folder: Path) -> DesignTable:
     """Open the results of a study, new or begun.
 
-    The folder keeps the study and the robot that the results belong to.
+    The folder keeps the study, the robot and the friction that the results belong to.
 
     Raises:
         SearchError: If the folder cannot be written, or holds the results of another study.
@@ -314,6 +315,8 @@ def open_table(study: Study, folder: Path) -> DesignTable:
             if path.exists():
                 _check_same(Document(path), document)
             write_text(path, document.text)
+        if study.ground:
+            _keep_friction(study, folder)
     except OSError as error:
         raise SearchError(f"{folder}: cannot be written: {error.strerror}") from None
     return DesignTable(folder / TABLE, [p.name for p in study.parameters], study.metrics)
@@ -331,6 +334,26 @@ def write_text(path: Path, text: str) -> None:
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def _keep_friction(study: Study, folder: Path) -> None:
+    """Check that results were made with the friction that the study's ground has now, and keep it.
+
+    The study names the ground only, whose file may have been changed meanwhile.
+    """
+    path, text = folder / GROUND, f"friction: {study.conditions.friction}\n"
+    if path.exists():
+        kept = path.read_text(encoding="utf-8")
+        made_with = f"with {kept.strip()}"
+    else:
+        kept = "" if (folder / TABLE).exists() else text
+        made_with = f"and does not tell the friction they were made with ({GROUND})"
+    if kept != text:
+        raise SearchError(
+            f"{folder}: holds results {made_with}; ground {study.ground!r} has {text.strip()} now; "
+            "use another folder"
+        )
+    write_text(path, text)
 
 
 def _check_same(kept: Document, new: Document) -> None:

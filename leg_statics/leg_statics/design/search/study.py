@@ -132,6 +132,12 @@ class Study:
         """Name of the study."""
         return str(self.document.root["name"])
 
+    @property
+    def ground(self) -> str:
+        """Name of the ground of the conditions; "" if they give its friction, or none."""
+        ground = self.document.root.get("conditions", {}).get("ground", "")
+        return ground if isinstance(ground, str) else ""
+
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """All metrics of a design: objectives first, then constrained and recorded ones."""
