@@ -31,7 +31,7 @@ def as_array(name: str, value: ArrayLike, *trailing: int) -> FloatArray:
     """
     try:
         array: FloatArray = np.asarray(value, np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ShapeError(f"{name} must be an array of numbers: {error}") from None
     shape = array.shape
     if shape != trailing and shape[len(shape) - len(trailing) :] != trailing:  # one point first

@@ -18,6 +18,10 @@ class ValueRangeError(LegError, ValueError):
     """A scalar or array argument has a value outside its allowed range."""
 
 
+class KindError(LegError, TypeError):
+    """An argument is something else than the function takes, such as a number for a leg."""
+
+
 class GeometryError(LegError, ValueError):
     """The dimensions of a mechanism do not describe a leg that can be assembled."""
 

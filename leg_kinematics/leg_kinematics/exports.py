@@ -5,6 +5,7 @@ from leg_kinematics.description import load_robot
 from leg_kinematics.errors import (
     DescriptionError,
     GeometryError,
+    KindError,
     LegError,
     NotSupportedError,
     ShapeError,
@@ -30,6 +31,7 @@ __all__ = [
     "GantryHybrid",
     "GeometryError",
     "Joint",
+    "KindError",
     "Leg",
     "LegError",
     "Linkage",

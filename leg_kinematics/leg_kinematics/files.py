@@ -7,7 +7,7 @@ import os
 import stat
 from pathlib import Path
 
-from leg_kinematics.errors import DescriptionError
+from leg_kinematics.errors import DescriptionError, KindError
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -23,9 +23,12 @@ def user_path(path: str | os.PathLike[str]) -> Path:
 
     Raises:
         DescriptionError: If there is no such home, as for a user whom this machine does not know.
+        KindError: If it is no path.
     """
     try:
         return Path(path).expanduser()
+    except TypeError:
+        raise KindError(f"a path must be text or a Path, got {type(path).__name__}") from None
     except RuntimeError:
         home = Path(path).parts[0]
         raise DescriptionError(

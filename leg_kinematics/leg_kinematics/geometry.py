@@ -10,8 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from leg_kinematics.arrays import FloatArray
-from leg_kinematics.errors import GeometryError
+from leg_kinematics.arguments import as_number
+from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.errors import GeometryError, LegError
 from leg_kinematics.mechanism import Excursion, Joint, Mechanism
 
 Dimension = Literal["length", "angle", "ratio"]
@@ -66,11 +67,10 @@ class Dimensioned(Mechanism):
                 range is reversed, NaN or missing.
         """
         for f in geometry_parameters(self):
-            value = getattr(self, f.name)
-            if not np.isfinite(value):
-                raise GeometryError(
-                    f"{f.name} ({f.metadata['symbol']}) must be finite, got {value}"
-                )
+            try:
+                value = as_number(f"{f.name} ({f.metadata['symbol']})", getattr(self, f.name))
+            except LegError as error:
+                raise GeometryError(str(error)) from None
             if f.metadata["positive"] and value <= 0.0:
                 unit = SI_UNITS[f.metadata["dimension"]]
                 raise GeometryError(
@@ -82,27 +82,27 @@ class Dimensioned(Mechanism):
     @cached_property
     def joint_limits(self) -> FloatArray:
         """Ranges of the actuated joints (n, 2) [rad or m]."""
-        return _pairs(self.joint_ranges)
+        return _pairs("joint_ranges", self.joint_ranges)
 
     @cached_property
     def passive_joint_limits(self) -> FloatArray:
         """Ranges of the excursions of the passive joints (e, 2) [rad or m]."""
-        return _pairs(self.passive_joint_ranges)
+        return _pairs("passive_joint_ranges", self.passive_joint_ranges)
 
     @cached_property
     def _geometry(self) -> FloatArray:
         """Geometry parameters in the order of declaration (g,) [SI]."""
-        return np.array([getattr(self, f.name) for f in geometry_parameters(self)])
+        return np.array([getattr(self, f.name) for f in geometry_parameters(self)], np.float64)
 
 
-def _pairs(ranges: Any) -> FloatArray:
-    array = np.array(ranges, dtype=np.float64)
+def _pairs(name: str, ranges: Any) -> FloatArray:
+    array = as_array(name, ranges)
     return array if array.size else np.empty((0, 2))
 
 
 def check_ranges(name: str, ranges: Any, joints: Sequence[Joint | Excursion]) -> None:
     """Raise a GeometryError unless there is a range (lower, upper) for each joint."""
-    array = _pairs(ranges)
+    array = _pairs(name, ranges)
     if array.shape != (len(joints), 2):
         raise GeometryError(
             f"{name} must be {len(joints)} pairs (lower, upper), got shape {array.shape}"

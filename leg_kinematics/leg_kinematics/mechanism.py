@@ -304,9 +304,9 @@ class Mechanism(ABC):
         Raises:
             UnknownNameError: If the mechanism has no such mode.
         """
-        if not assembly_mode:
+        if isinstance(assembly_mode, str) and not assembly_mode:
             return 0
         try:
             return self.assembly_modes.index(assembly_mode)
-        except ValueError:
+        except ValueError:  # also of arrays, which have no truth
             raise UnknownNameError("assembly mode", assembly_mode, self.assembly_modes) from None

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Mechanism, Posture
@@ -51,8 +52,10 @@ class Mirrored(Mechanism):
         """Refuse what has no point foot to reflect.
 
         Raises:
+            KindError: If it is no mechanism.
             NotSupportedError: If the task coordinates are not x, y, z.
         """
+        require("original", self.original, Mechanism)
         if not self.original.has_point_foot:
             raise NotSupportedError(
                 f"mechanism {self.original.name!r} has no point foot and cannot be mirrored"

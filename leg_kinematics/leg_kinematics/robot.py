@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import ShapeError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism
@@ -119,8 +120,10 @@ class Leg:
                 for all [N.m or N]; by default none limits.
 
         Raises:
+            KindError: If it is no mechanism.
             ShapeError: If there is not one pair of limits an actuator.
         """
+        require("mechanism", mechanism, Mechanism)
         joints = tuple(joint.name for joint in mechanism.joints)
         limits = as_matching("effort_limits", effort_limits, (2,), (len(joints),))
         if limits.ndim > 2:
@@ -162,11 +165,11 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such leg.
         """
-        if not name and len(self.legs) == 1:
+        if len(self.legs) == 1 and isinstance(name, str) and not name:
             return next(iter(self.legs.values()))
         try:
             return self.legs[name]
-        except KeyError:
+        except (KeyError, TypeError):  # what has no hash is no name
             raise UnknownNameError("leg", name, self.legs) from None
 
     def with_frame_prefix(self, prefix: str) -> Robot:
@@ -177,8 +180,10 @@ class Robot:
                 robot_state_publisher.
 
         Raises:
+            KindError: If it is no text.
             ValueRangeError: If names of frames cannot begin with it.
         """
+        require("frame_prefix", prefix, str)
         if not re.fullmatch(FRAME_PREFIX, prefix):
             raise ValueRangeError(
                 f"frame_prefix: got {prefix!r}; allowed: letters, digits, _ . - and / between"

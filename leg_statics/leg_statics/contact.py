@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from leg_kinematics.arguments import require
 from leg_kinematics.arrays import (
     FloatArray,
     as_array,
@@ -72,6 +73,7 @@ def _known_row(contact: Contact, n: int) -> FloatArray:
 
 def _arrays(contact: Contact, n: int) -> Contact:
     """Return a contact whose fields are arrays."""
+    require("contact", contact, Contact)
     return Contact(
         as_array("friction", contact.friction),
         as_array("normal", contact.normal, 3),

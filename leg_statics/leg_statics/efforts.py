@@ -40,12 +40,16 @@ def joint_efforts(
     Raises:
         ShapeError: If shapes do not fit.
     """
-    batch = np.shape(jacobian)[:-2]
+    jacobian = as_array("jacobian", jacobian)
+    if jacobian.ndim < 2 or jacobian.shape[-2] < 3:
+        raise ShapeError(f"jacobian must have shape (..., 3, n), got {jacobian.shape}")
+    batch, n = jacobian.shape[:-2], jacobian.shape[-1]
+    angular = as_matching("angular_jacobian", angular_jacobian, (3, n), batch)
     f = as_matching("force", force, (3,), batch)
     m = as_matching("moment", moment, (3,), batch)
     return -(
         np.einsum("...in,...i->...n", jacobian[..., :3, :], f)
-        + np.einsum("...in,...i->...n", angular_jacobian, m)
+        + np.einsum("...in,...i->...n", angular, m)
     )
 
 

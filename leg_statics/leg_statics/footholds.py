@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, StatusArray, as_array, broadcast_error, has_code
 from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, load_columns, load_numbers, put, store
@@ -203,10 +204,12 @@ def evaluate_footholds(leg: Leg, foot_position: ArrayLike, contact: Contact) -> 
         contact: Ground, required load and moment.
 
     Raises:
+        KindError: If it is no leg or no contact.
         NotSupportedError: If the mechanism's end is no point foot.
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero.
     """
+    require("leg", leg, Leg)
     posture, twist_jacobian = leg.mechanism.inverse_with_twist(foot_position)
     return _judged(leg, posture, twist_jacobian, contact)
 

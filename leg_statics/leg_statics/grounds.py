@@ -59,7 +59,7 @@ class Grounds:
         """
         try:
             return self.by_name[name]
-        except KeyError:
+        except (KeyError, TypeError):  # what has no hash is no name
             raise UnknownNameError("ground", name, self.by_name) from None
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from leg_kinematics.arguments import as_names, require
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.conditioning import condition_number, row_factors
 from leg_kinematics.errors import NotSupportedError, ShapeError, UnknownNameError
@@ -287,12 +288,13 @@ def find_index(name: str) -> Index:
     """
     try:
         return INDICES[name]
-    except KeyError:
+    except (KeyError, TypeError):  # what has no hash is no name
         raise UnknownNameError("index", name, INDICES) from None
 
 
 def supported_indices(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the indices that a mechanism has."""
+    require("mechanism", mechanism, Mechanism)
     return tuple(name for name, index in INDICES.items() if index.supports(mechanism))
 
 
@@ -313,7 +315,9 @@ def evaluate_indices(
         UnknownNameError: If a name is not registered.
         NotSupportedError: If the mechanism does not have an index.
     """
-    return indices_of(Kinematics(mechanism, posture), names)
+    require("posture", posture, Posture)
+    require("mechanism", mechanism, Mechanism)
+    return indices_of(Kinematics(mechanism, posture), as_names("names", names))
 
 
 def indices_of(

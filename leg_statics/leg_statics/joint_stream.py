@@ -17,8 +17,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from leg_kinematics.arguments import as_names, require
 from leg_kinematics.arrays import FloatArray, as_array, as_non_negative
-from leg_kinematics.errors import LegError
+from leg_kinematics.errors import LegError, ShapeError
 from leg_kinematics.robot import Robot
 from leg_statics.capacity.problem import check_effort_limits
 from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
@@ -42,12 +43,18 @@ class JointStream:
         friction: Friction coefficient of the ground for the load capacity.
 
     Raises:
+        KindError: If it is no robot.
+        ShapeError: If the friction is not one number.
         ValueRangeError: If the friction is negative or NaN, or limits are NaN or reversed.
     """
 
     def __init__(self, robot: Robot, friction: float) -> None:
+        require("robot", robot, Robot)
         self.robot = robot
-        self.friction = float(as_non_negative("friction", friction))
+        checked = as_non_negative("friction", friction)
+        if checked.ndim:
+            raise ShapeError(f"friction must be one number, got shape {checked.shape}")
+        self.friction = float(checked)
         _, limits = robot.effort_limits()
         check_effort_limits(limits[:, 0], limits[:, 1])
         self._layouts: dict[tuple[str, ...], JointLayout] = {}
@@ -57,11 +64,16 @@ class JointStream:
 
         Raises:
             JointStateError: If a name appears more than once.
+            KindError: If they are no names.
         """
-        names = tuple(names)
-        known = self._layouts.get(names)
+        names = _as_tuple(names)
+        try:
+            known = self._layouts.get(names)
+        except TypeError:  # what has no hash is no name
+            known = None
         if known is not None:
             return known
+        names = as_names("names", names)
         repeated = [name for name, count in Counter(names).items() if count > 1]
         if repeated:
             raise JointStateError(f"name: {', '.join(repeated)} appear more than once")
@@ -92,6 +104,7 @@ class JointStream:
         Raises:
             JointStateError: If a name appears more than once or a length is wrong.
         """
+        names = _as_tuple(names)
         layout = self.layout(names)
         fields = joint_fields(len(names), position, velocity, effort)
         parts = [self._group_states(group, *fields) for group in layout.groups]
@@ -144,6 +157,11 @@ def joint_fields(
         _field("velocity", velocity, count, may_be_empty=True),
         _field("effort", effort, count, may_be_empty=True),
     ]
+
+
+def _as_tuple(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names as a tuple; what is in a tuple is looked at when it is new."""
+    return names if isinstance(names, tuple) else as_names("names", names)
 
 
 def _field(name: str, values: ArrayLike, count: int, *, may_be_empty: bool) -> FloatArray:

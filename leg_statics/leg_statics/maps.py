@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from leg_kinematics.arguments import as_count, as_names, as_number, require
 from leg_kinematics.arrays import FloatArray, StatusArray
 from leg_kinematics.errors import NotSupportedError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism, Posture
@@ -21,6 +22,7 @@ from leg_statics.workspace import workspace_bounds
 
 CAPACITY_LAYER = "load_capacity"
 MOST_POINTS = 20_000_000
+MOST_THREADS = 1024
 MOST_ALONG_AXIS = 1e9  # beyond, a number of points is not told exactly
 
 
@@ -55,7 +57,7 @@ class IndexMap(NamedTuple):
 
     def layer(self, name: str) -> FloatArray:
         """Return the values of one layer (..., ny, nx)."""
-        if name not in self.layers:
+        if not isinstance(name, str) or name not in self.layers:
             raise UnknownNameError("layer", name, self.layers)
         return self.values[..., self.layers.index(name)]
 
@@ -141,11 +143,10 @@ def plane_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If height or resolution are out of range, or the map would be too large.
     """
-    if not np.isfinite(height):
-        raise ValueRangeError(f"height must be finite, got {height}")
-    names = _layers(leg.mechanism, layers, contact)
+    height = as_number("height", height)
+    names = _layers(leg, layers, contact)
     x, y = _axes(leg.mechanism, resolution, 2)
-    values, status = _slice(leg, x, y, float(height), names, contact)
+    values, status = _slice(leg, x, y, height, names, contact)
     return IndexMap(x, y, np.array(height), names, values, status)
 
 
@@ -172,12 +173,11 @@ def line_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If place or resolution are out of range.
     """
-    if not np.isfinite([y, height]).all():
-        raise ValueRangeError(f"y and height must be finite, got {y} and {height}")
-    names = _layers(leg.mechanism, layers, contact)
-    line = np.array([float(y)])
+    y, height = as_number("y", y), as_number("height", height)
+    names = _layers(leg, layers, contact)
+    line = np.array([y])
     x, _ = _axes(leg.mechanism, resolution, 2)
-    values, status = _slice(leg, x, line, float(height), names, contact)
+    values, status = _slice(leg, x, line, height, names, contact)
     return IndexMap(x, line, np.array(height), names, values, status)
 
 
@@ -206,7 +206,8 @@ def volume_map(
         UnknownNameError: If a layer does not exist.
         ValueRangeError: If the resolution is out of range, or the map would be too large.
     """
-    names = _layers(leg.mechanism, layers, contact)
+    threads = as_count("threads", threads, MOST_THREADS)
+    names = _layers(leg, layers, contact)
     x, y, z = _axes(leg.mechanism, resolution, 3)
     shape = (len(z), len(y), len(x))
     values = np.full((*shape, len(names)), np.nan)
@@ -241,7 +242,8 @@ def _axes(mechanism: Mechanism, resolution: float, count: int) -> list[FloatArra
 
 def _grid_range(mechanism: Mechanism, resolution: float) -> tuple[FloatArray, FloatArray]:
     """Return the first and last multiple of the resolution along x, y and z."""
-    if not 0.0 < resolution < np.inf:
+    resolution = as_number("resolution", resolution)
+    if resolution <= 0.0:
         raise ValueRangeError(f"resolution must be > 0 m, got {resolution}")
     bounds = workspace_bounds(mechanism)
     with np.errstate(over="ignore"):
@@ -250,16 +252,21 @@ def _grid_range(mechanism: Mechanism, resolution: float) -> tuple[FloatArray, Fl
 
 
 def _layers(
-    mechanism: Mechanism,
+    leg: Leg,
     layers: Sequence[str],
     contact: Contact | None,
 ) -> tuple[str, ...]:
     """Return the layers asked for, or all that can be computed from what is given."""
+    require("leg", leg, Leg)
+    if contact is not None:
+        require("contact", contact, Contact)
+    mechanism = leg.mechanism
     if not mechanism.has_point_foot:
         raise NotSupportedError(
             f"mechanism {mechanism.name!r} has {len(mechanism.task_coordinates)} task "
             "coordinates: index maps need a point foot x, y, z"
         )
+    layers = as_names("layers", layers)
     if not layers:
         return supported_layers(mechanism) if contact else supported_indices(mechanism)
     for name in layers:
@@ -267,7 +274,7 @@ def _layers(
             raise UnknownNameError("layer", name, supported_layers(mechanism))
     if CAPACITY_LAYER in layers and contact is None:
         raise ValueRangeError(f"layer {CAPACITY_LAYER!r} needs a contact")
-    return tuple(layers)
+    return layers
 
 
 def _slice(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, StatusArray, as_array
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.mechanism import Mechanism
@@ -98,6 +99,8 @@ def longest_step(
         ValueRangeError: If heights or offsets are not finite, or the direction is not horizontal.
         ShapeError: If shapes do not fit.
     """
+    require("leg", leg, Leg)
+    require("criterion", criterion, Criterion)
     along = _horizontal_unit(direction)
     heights, offsets = np.broadcast_arrays(
         _finite("height", height), _finite("lateral_offset", lateral_offset)
@@ -185,8 +188,13 @@ def common_step(
         direction: Walking direction in the base frame, horizontal (3,).
         criterion: What makes a point feasible.
     """
+    require("legs", legs, Mapping)
+    require("contact", contact, Contact)
+    if not legs:
+        raise ValueRangeError("legs must be at least one leg, got none")
     steps = {}
     for name, leg in legs.items():
+        require("legs", leg, Leg)
         offset = lateral_offset(leg) if callable(lateral_offset) else lateral_offset
         steps[name] = longest_step(
             leg,

@@ -12,12 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from leg_kinematics.arguments import as_count, require
 from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.errors import NotSupportedError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.status import Status
 
 POINTS_PER_JOINT = 15  # of the grids that tell bounds and heights
+MOST_POINTS = 10_000_000  # of a grid
 MIDDLE = 0.8  # share of the volume that typical heights span
 SECTION_POINTS = 240  # along each axis of a section
 
@@ -60,8 +62,9 @@ def actuator_grid(mechanism: Mechanism, points_per_joint: int) -> FloatArray:
 
     Each stands for the same volume of the box.
     """
-    if points_per_joint < 1:
-        raise ValueRangeError(f"points_per_joint must be >= 1, got {points_per_joint}")
+    require("mechanism", mechanism, Mechanism)
+    most = int(MOST_POINTS ** (1.0 / len(mechanism.joints)))
+    points_per_joint = as_count("points_per_joint", points_per_joint, most)
     lower, upper = mechanism.joint_limits.T
     share = (np.arange(points_per_joint) + 0.5) / points_per_joint
     axes = lower + np.outer(share, upper - lower)
@@ -103,7 +106,8 @@ def sample_workspace(mechanism: Mechanism, points_per_joint: int) -> WorkspaceSa
 
 def workspace_bounds(mechanism: Mechanism, points_per_joint: int = POINTS_PER_JOINT) -> FloatArray:
     """Box in the leg frame that holds the workspace (t, 2) [m], with a margin of 2 %."""
-    posture = mechanism.forward(actuator_grid(mechanism, points_per_joint))
+    grid = actuator_grid(mechanism, points_per_joint)
+    posture = mechanism.forward(grid)
     foot = posture.foot_position[posture.status == Status.OK]
     if not len(foot):
         raise ValueRangeError(f"mechanism {mechanism.name!r} reaches no point within its limits")

@@ -74,7 +74,7 @@ def test_a_line_holds_what_the_plane_through_it_does():
     np.testing.assert_array_equal(line.x, plane.x)
     np.testing.assert_array_equal(line.values[0], plane.values[k])
     np.testing.assert_array_equal(line.status[0], plane.status[k])
-    with pytest.raises(ValueRangeError, match="y and height must be finite"):
+    with pytest.raises(ValueRangeError, match="must be finite"):
         line_map(LEG, np.nan, -0.6, 0.01)
 
 

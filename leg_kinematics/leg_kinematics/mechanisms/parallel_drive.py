@@ -208,17 +208,18 @@ class ParallelDrive(Dimensioned):
         return self._signs * [crank_1, crank_2, center, knee, center]
 
     @cached_property
-    def _known_parameters(self) -> dict[str, FloatArray]:
+    def _known_parameters(self) -> dict[int, FloatArray]:
         return {}
 
     def _parameters(self, assembly_mode: str) -> FloatArray:
         """Return all that the kernels know of the leg in one array, kept for the next call."""
-        if assembly_mode not in self._known_parameters:
+        mode = self.mode_index(assembly_mode)
+        if mode not in self._known_parameters:
             limits = np.concatenate([self.joint_limits, self._passive_bounds])
-            self._known_parameters[assembly_mode] = np.concatenate(
+            self._known_parameters[mode] = np.concatenate(
                 [self._geometry, self._branch(assembly_mode), self._rest, limits.ravel()]
             )
-        return self._known_parameters[assembly_mode]
+        return self._known_parameters[mode]
 
     @cached_property
     def initial_posture(self) -> Posture:
