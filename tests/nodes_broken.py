@@ -3,6 +3,7 @@
 
 import contextlib
 import logging
+import os
 import signal
 import sys
 
@@ -15,12 +16,12 @@ from leg_kinematics.nodes.robot_node import RobotNode
 class BrokenNode(RobotNode):
     """Fails in a timer and in a service; answers in another service.
 
-    With the argument "swallow" it swallows an interrupt at the start, as a compiler may.
+    With SWALLOW in its environment it swallows an interrupt at the start, as a compiler may.
     """
 
     def __init__(self):
         super().__init__("broken")
-        if sys.argv[1:] == ["swallow"]:
+        if "SWALLOW" in os.environ:
             with contextlib.suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
         self.create_timer(0.02, self.fail)

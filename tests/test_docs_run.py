@@ -110,6 +110,8 @@ def sandbox(tmp_path_factory):
     names = ("my_planner.py", *IN_PROCESS, ALONE)
     for name, snippet in zip(names, blocks(readme, "python"), strict=True):
         (folder / name).write_text(snippet)
+    model = ROOT / "config" / "robots" / "solo12.urdf"  # one that somebody may have
+    (folder / "my_robot.urdf").write_bytes(model.read_bytes())
     (study,) = blocks(readme, "yaml")
     (folder / "study.yaml").write_text(study)
     return folder

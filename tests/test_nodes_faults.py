@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults of a node's own code, and floods of bad input: the node lives on, and its log is short."""
 
+import os
 import re
 import signal
 import subprocess
@@ -50,7 +51,8 @@ def test_callbacks_that_fail_stop_neither_the_node_nor_its_other_services(log):
 
 def test_an_interrupt_that_something_swallows_at_the_start_ends_the_node_all_the_same():
     done = subprocess.run(
-        [sys.executable, BROKEN_NODE, "swallow"],
+        [sys.executable, BROKEN_NODE],
+        env={**os.environ, "SWALLOW": "1"},
         capture_output=True,
         text=True,
         timeout=START_TIMEOUT,

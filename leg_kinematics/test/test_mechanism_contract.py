@@ -509,11 +509,15 @@ def test_each_excursion_limits_the_workspace(mechanism):
         limited = replace(free, passive_joint_ranges=tuple(ranges))
         wanted = np.where(excursions[:, k] > reach, Status.PASSIVE_JOINT_LIMIT, Status.OK)
         off = np.abs(excursions[:, k] - reach) > 2e-9
-        for solved in (
-            limited.forward(posture.joint_positions),
-            limited.inverse(posture.foot_position),
-        ):
-            np.testing.assert_array_equal(solved.status[off], wanted[off], excursion.name)
+        solved = limited.forward(posture.joint_positions)
+        np.testing.assert_array_equal(solved.status[off], wanted[off], excursion.name)
+        solved = limited.inverse(posture.foot_position)
+        # the foot may come by there in another posture, which keeps the limits
+        other = joint_distance(mechanism, solved.joint_positions, posture.joint_positions) > 1e-6
+        other &= wanted == Status.PASSIVE_JOINT_LIMIT
+        expected = np.where(other, Status.OK, wanted)
+        np.testing.assert_array_equal(solved.status[off], expected[off], excursion.name)
+        assert np.mean(other) < 0.1
 
 
 @mechanisms

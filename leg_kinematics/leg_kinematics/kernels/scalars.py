@@ -38,6 +38,12 @@ NEAREST = 6755399441055744.0  # added and taken away again it rounds to the near
 LARGEST_ANGLE = 1e4  # [rad], up to which `cosine_sine` is exact
 
 
+@scalar
+def direction(angle: float) -> tuple[float, float]:
+    """Return (cos, sin) of any angle; one of many thousand turns stays on the circle."""
+    return math.cos(angle), math.sin(angle)
+
+
 @inlined
 def cosine_sine(angle: float) -> tuple[float, float]:
     """Return (cos, sin) like `math`, within 2e-16 up to 1e4 rad, and quickly in blocks of points.

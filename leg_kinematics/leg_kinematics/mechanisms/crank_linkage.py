@@ -207,8 +207,7 @@ class CrankLinkage(Dimensioned):
     def inverse(self, foot_position: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the crank angle at which the foot passes nearest to a position.
 
-        Within limits it is the nearest pass that keeps them, or an end of the crank's range, if one
-        is within `reach_tolerance`.
+        Within limits it is the nearest pass that keeps them, if one is within `reach_tolerance`.
 
         Args:
             foot_position: Wanted foot in the leg frame (..., 3) [m].
@@ -237,8 +236,7 @@ class CrankLinkage(Dimensioned):
 
         It is the default where none does within `reach_tolerance`.
         """
-        ends = np.broadcast_to(self.joint_limits[0], (*foot.shape[:-1], 2))
-        angles = np.concatenate([passes.crank_angles, ends], axis=-1)
+        angles = passes.crank_angles
         tried = self.forward(angles[..., None], assembly_mode)
         with np.errstate(over="ignore", invalid="ignore"):  # infinitely far is far enough
             distances = np.linalg.norm(tried.foot_position - foot[..., None, :], axis=-1)

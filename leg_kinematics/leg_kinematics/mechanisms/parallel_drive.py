@@ -36,6 +36,7 @@ from leg_kinematics.arrays import FloatArray, as_array, has_code, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
+from leg_kinematics.kernels.scalars import direction
 from leg_kinematics.kernels.settled import UNCERTAIN, settled
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms import parallel_drive_kernels as kernels
@@ -44,7 +45,6 @@ from leg_kinematics.mechanisms.parallel_drive_equations import (
     Pose,
     axis_angles,
     closure_angles,
-    direction,
     gradients,
     in_platform,
     pantograph_of_drive,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.kernels.kernel import inlined, scalar
-from leg_kinematics.kernels.scalars import arctan2, within, wrapped
+from leg_kinematics.kernels.scalars import arctan2, direction, within, wrapped
 from leg_kinematics.mechanisms.walking_axes import in_leg_frame
 from leg_kinematics.status import Status
 
@@ -183,12 +183,6 @@ def gradients(g: Geometry, p: Pose) -> tuple[Gradient, Gradient]:
         rod_gradient(g, 1.0, (p.cp1, p.sp1), center, a, b, (p.x1, p.y1, p.z1)),
         rod_gradient(g, -1.0, (p.cp2, p.sp2), center, a, b, (p.x2, p.y2, p.z2)),
     )
-
-
-@scalar
-def direction(angle: float) -> tuple[float, float]:
-    """Return (cos, sin) of the library."""
-    return math.cos(angle), math.sin(angle)
 
 
 @inlined

@@ -14,7 +14,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.kernels.blocks import BLOCK, get3, load, put, store, store_columns
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.kernels.scalars import LARGEST_ANGLE, cosine_sine
+from leg_kinematics.kernels.scalars import LARGEST_ANGLE, cosine_sine, direction
 from leg_kinematics.kernels.settled import UNCERTAIN
 from leg_kinematics.mechanisms.parallel_drive_equations import (
     BLOCK_STEPS,
@@ -33,7 +33,6 @@ from leg_kinematics.mechanisms.parallel_drive_equations import (
     Pose,
     closure_angles,
     crank_angles,
-    direction,
     foot_of_pose,
     gradients,
     jacobian_columns,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from leg_kinematics.kernels.kernel import scalar
-from leg_kinematics.kernels.scalars import cosine_sine
+from leg_kinematics.kernels.scalars import direction
 
 PARENT, PRISMATIC, AXIS, OFFSET = 0, 1, 2, 5
 
@@ -32,7 +32,7 @@ def place_bodies(chain, q, rotations, origins, axes):
         slide = q[k] if chain[k, PRISMATIC] == 1.0 else 0.0
         ox, oy, oz = chain[k, OFFSET], chain[k, OFFSET + 1], chain[k, OFFSET + 2]
         ox, oy, oz = ox + slide * ax, oy + slide * ay, oz + slide * az
-        c, s = cosine_sine(0.0 if chain[k, PRISMATIC] == 1.0 else q[k])
+        c, s = direction(0.0 if chain[k, PRISMATIC] == 1.0 else q[k])
         v = 1.0 - c
         for r in range(3):
             x, y, z = rotations[parent, r, 0], rotations[parent, r, 1], rotations[parent, r, 2]

@@ -32,7 +32,7 @@ import numpy as np
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.kernels.scalars import arctan2, cosine_sine, within
+from leg_kinematics.kernels.scalars import arctan2, direction, within
 from leg_kinematics.kernels.vectors import cross, inner
 from leg_kinematics.model.leg_tree import LegTree
 from leg_kinematics.status import Status
@@ -164,8 +164,8 @@ def levers_of_angles(g, q, foot):
     """Return the two levers (last, middle) whose signs are the mode, relative to their arms."""
     a1, a2, a3, r2, r3, f, d = ends(g, foot)
     a, b, _ = last_joint(g, a1, a2, a3, r2, r3, f, d)
-    c2, s2 = cosine_sine(q[1])
-    c3, s3 = cosine_sine(q[0] if g[PLAN, 2] == 1.0 else q[2])
+    c2, s2 = direction(q[1])
+    c3, s3 = direction(q[0] if g[PLAN, 2] == 1.0 else q[2])
     reached = plus(r3, turned(f, a3, c3, s3))
     w = vector_of(g[W])
     t = cross(a2, w)
@@ -178,9 +178,9 @@ def levers_of_angles(g, q, foot):
 def foot_of_angles(g, q):
     """Return the foot, and the axes and origins of joints 2 and 3."""
     a1, a2, a3 = vector_of(g[A1]), vector_of(g[A2]), vector_of(g[A3])
-    c1, s1 = cosine_sine(q[0])
-    c2, s2 = cosine_sine(q[1])
-    c3, s3 = cosine_sine(q[2])
+    c1, s1 = direction(q[0])
+    c2, s2 = direction(q[1])
+    c3, s3 = direction(q[2])
     z2, o2 = turned(a2, a1, c1, s1), turned(vector_of(g[R2]), a1, c1, s1)
     z3 = turned(turned(a3, a2, c2, s2), a1, c1, s1)
     o3 = plus(o2, turned(turned(vector_of(g[R3]), a2, c2, s2), a1, c1, s1))
