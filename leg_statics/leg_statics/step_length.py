@@ -22,7 +22,6 @@ from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, Footholds, Verdict, evaluate_footholds
-from leg_statics.weight import LEVEL_GRAVITY
 from leg_statics.workspace import actuator_grid
 
 END_TOLERANCE = 1e-6  # m, to which the ends of a stance are found
@@ -202,9 +201,9 @@ def common_step(
             contact._replace(
                 normal=leg.mount.vectors_to_leg(contact.normal),
                 moment=leg.mount.vectors_to_leg(contact.moment),
-                gravity=leg.mount.vectors_to_leg(
-                    LEVEL_GRAVITY if contact.gravity is None else contact.gravity
-                ),
+                gravity=None
+                if contact.gravity is None
+                else leg.mount.vectors_to_leg(contact.gravity),
             ),
             lateral_offset=offset,
             direction=leg.mount.vectors_to_leg(direction),

@@ -301,7 +301,7 @@ def all_finite(vector: FloatArray) -> bool:
 
 
 @scalar
-def solve_platform(
+def slides_of_platform(
     g: Geometry, branch: Branch, task: FloatArray, q: FloatArray, closure: FloatArray
 ) -> bool:
     """Fill slides and closure of a platform position; return whether it is within reach."""
@@ -315,7 +315,7 @@ def solve_platform(
 
 
 @scalar
-def solve_slides(
+def platform_of_slides(
     g: Geometry, branch: Branch, q: FloatArray, task: FloatArray, closure: FloatArray
 ) -> bool:
     """Fill platform position and closure of slides; return whether the bars reach."""
@@ -340,7 +340,7 @@ def _inverse(geometry, signs, rest, limits, passive_limits, task, q, closure, st
         closure[i] = math.nan
         if not all_finite(task[i]):
             status[i] = INVALID_INPUT
-        elif not solve_platform(g, branch, task[i], q[i], closure[i]):
+        elif not slides_of_platform(g, branch, task[i], q[i], closure[i]):
             status[i] = UNREACHABLE
         else:
             status[i] = status_of_point(g, branch, rest, limits, passive_limits, q[i], closure[i])
@@ -359,7 +359,7 @@ def _forward(geometry, signs, rest, limits, passive_limits, q, task, closure, st
         closure[i] = math.nan
         if not all_finite(q[i]):
             status[i] = INVALID_INPUT
-        elif not solve_slides(g, branch, q[i], task[i], closure[i]):
+        elif not platform_of_slides(g, branch, q[i], task[i], closure[i]):
             status[i] = UNREACHABLE
         else:
             status[i] = status_of_point(g, branch, rest, limits, passive_limits, q[i], closure[i])

@@ -294,30 +294,26 @@ class NewtonLeg(ModelLeg):
         Where the loops close but the inverse of that foot is another posture, the posture is of
         another branch: SINGULAR.
         """
-        return self._forward(joint_positions, assembly_mode)[0]
+        return self.forward_with_twist(joint_positions, assembly_mode)[0]
 
     def forward_with_twist(
         self, joint_positions: ArrayLike, assembly_mode: str = ""
     ) -> tuple[Posture, FloatArray]:
         """`forward` and `twist_jacobian` of the same points."""
-        posture, twist = self._forward(joint_positions, assembly_mode)
-        return posture, twist
-
-    def _forward(self, joint_positions: ArrayLike, mode: str) -> tuple[Posture, FloatArray]:
         n = len(self.joints)
         given = as_array("joint_positions", joint_positions, n)
         goal = given.reshape(-1, n)
-        table = self._table(mode)
+        table = self._table(assembly_mode)
         start = table.joints[table.nearest_to_joints(goal)]
         begin = start[:, self._order[0]]
         signs = np.array([table.signs[0], 0.0])
         with np.errstate(invalid="ignore"):  # infinite joint positions stay without an answer
             end = self._near_turn(goal, begin)
         q, foot, twist, _, status = newton.follow_postures(
-            *self._branch(mode, signs), start, begin, end, JOINTS_ARE_GIVEN
+            *self._branch(assembly_mode, signs), start, begin, end, JOINTS_ARE_GIVEN
         )
         solved = status == Status.OK
-        back = self._followed(foot[solved], mode)[0]
+        back = self._followed(foot[solved], assembly_mode)[0]
         same = np.abs(self._turned(back - q[solved])).max(axis=1, initial=0.0) <= SAME
         q[:, self._order[0]] = goal
         status[solved] = np.where(same, self._limited(q[solved]), Status.SINGULAR)

@@ -18,12 +18,10 @@ from leg_kinematics.mechanisms.walking_axes import in_leg_frame
 from leg_kinematics.status import Status
 
 REST_SIZE = 12  # of the passive joints' rest, see `passive_measures`
-LIMITS_SIZE = 24  # lower and upper limits of 3 cranks and 9 passive joints
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
 
 NEWTON_STEPS = 20
-BLOCK_STEPS = 5  # of a block of points; within the default ranges rounding is left after them
 NEWTON_TOLERANCE = 1e-14  # [rad]
 
 Numbers = Sequence[float]  # a tuple in compiled code

@@ -17,11 +17,9 @@ from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import LARGEST_ANGLE, cosine_sine, direction
 from leg_kinematics.kernels.settled import UNCERTAIN
 from leg_kinematics.mechanisms.parallel_drive_equations import (
-    BLOCK_STEPS,
     BRANCH_SIZE,
     GEOMETRY_SIZE,
     INVALID_INPUT,
-    LIMITS_SIZE,
     NEWTON_TOLERANCE,
     OK,
     REST_SIZE,
@@ -49,6 +47,9 @@ from leg_kinematics.mechanisms.parallel_drive_equations import (
     turned,
 )
 from leg_kinematics.mechanisms.walking_axes import in_leg_frame, in_walking_axes
+
+LIMITS_SIZE = 24  # lower and upper limits of 3 cranks and 9 passive joints
+BLOCK_STEPS = 5  # of Newton's method; within the default ranges rounding is left after them
 
 # Kernels run over blocks of points, with these rows: what is given, foot or cranks, and what is
 # found, cranks or foot and below them the closure;

@@ -126,8 +126,9 @@ def _draw_forces(ax: Axes, feet: FloatArray, force: FloatArray) -> None:
     """Draw the horizontal parts of forces as arrows."""
     horizontal = np.linalg.norm(force[:, :2], axis=-1)
     scale = LONGEST_ARROW / max(float(horizontal.max()), 1e-9)
-    for foot, vector in zip(feet, force, strict=True):
-        tip = foot[:2] + scale * vector[:2]
+    tips = feet[:, :2] + scale * force[:, :2]
+    ax.update_datalim(tips[:, ::-1])  # an arrow that ends outside would not be drawn
+    for foot, tip in zip(feet, tips, strict=True):
         ax.annotate(
             "",
             (tip[1], tip[0]),

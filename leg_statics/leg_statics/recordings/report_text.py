@@ -31,7 +31,7 @@ LEGEND = (
     "(mu_e) and in both horizontal directions (mu_e,xy).",
     "Feet whose wrench tells that they are in the air are left out of loads, capacities and "
     "frictions.",
-    "The leg's own weight and dynamics are left out, as in the statics node.",
+    "A leg's own weight counts where a model tells its masses; dynamics are left out.",
     "Answers to planners' queries are found anew, with this robot, these grounds and the recorded "
     "effort limits. They are the same if no number is off by more than 1e-9, relative or absolute.",
 )

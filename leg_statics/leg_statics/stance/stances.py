@@ -33,9 +33,8 @@ from leg_kinematics.status import Status
 from leg_statics.capacity.problem import UP, check_effort_limits, check_normals
 from leg_statics.stance.balance import INVALID_INPUT, greatest_multiple
 from leg_statics.stance.interior_point import OPTIMAL, UNBOUNDED
+from leg_statics.weight import LEVEL_GRAVITY
 
-GRAVITY = np.array([0.0, 0.0, -9.80665])  # [m/s²]
-GRAVITY.flags.writeable = False
 NONE_FREE = np.zeros(3)
 BAND = 1e-9  # a load is borne if this much less of it is
 
@@ -113,7 +112,7 @@ class Load(NamedTuple):
 
     mass: ArrayLike
     center_of_mass: ArrayLike = (0.0, 0.0, 0.0)
-    gravity: ArrayLike = GRAVITY
+    gravity: ArrayLike = LEVEL_GRAVITY
     acceleration: ArrayLike = (0.0, 0.0, 0.0)
     force: ArrayLike = (0.0, 0.0, 0.0)
     moment: ArrayLike = (0.0, 0.0, 0.0)
