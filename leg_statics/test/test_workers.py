@@ -148,8 +148,9 @@ class Cluster:
         return json.loads(self.file.read_text())["address"]
 
     def stop(self):
+        # A Dask worker that is asked to end says goodbye to its scheduler first, also to a lost one.
         for process in [*self.workers, self.scheduler]:
-            process.terminate()
+            process.kill()
         for process in [*self.workers, self.scheduler]:
             process.wait()
 
