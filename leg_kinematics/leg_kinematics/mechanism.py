@@ -6,6 +6,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -95,6 +96,21 @@ class Linkage(NamedTuple):
     names: tuple[str, ...]
     points: FloatArray
     bars: tuple[tuple[int, ...], ...]
+
+    def point(self, name: str) -> FloatArray:
+        """Return a point by its name (..., 3) [m].
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        if name not in self.names:
+            raise UnknownNameError("point", name, self.names)
+        return self.points[..., self.names.index(name), :]
+
+    def segments(self) -> FloatArray:
+        """Return the straight pieces of the bars by their two ends (..., s, 2, 3) [m]."""
+        pairs = [pair for bar in self.bars for pair in pairwise(bar)]
+        return self.points[..., np.array(pairs, dtype=np.int64).reshape(-1, 2), :]
 
 
 class Mechanism(ABC):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import ShapeError, UnknownNameError, ValueRangeError
-from leg_kinematics.mechanism import Mechanism
+from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.mirrored import Mirrored
 
 FRAME_PREFIX = r"(?!/)(?!.*//)[A-Za-z0-9_./-]*"
@@ -133,6 +133,14 @@ class Leg:
         name = mechanism.name
         passive = tuple(joint.name for joint in mechanism.passive_joints)
         return cls(name, name, mechanism, mount, name, joints, passive, rows)
+
+    def segments(self, posture: Posture) -> FloatArray:
+        """Return the bars of the leg as straight pieces for drawing.
+
+        Returns:
+            Both ends of each piece in the base frame (..., s, 2, 3) [m].
+        """
+        return self.mount.to_base(self.mechanism.linkage(posture).segments())
 
     @property
     def mirrored(self) -> bool:

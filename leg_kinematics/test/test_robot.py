@@ -4,7 +4,14 @@
 import numpy as np
 import pytest
 
-from leg_kinematics import Leg, ParallelDrive, ShapeError, ValueRangeError, load_robot
+from leg_kinematics import (
+    Leg,
+    ParallelDrive,
+    ShapeError,
+    UnknownNameError,
+    ValueRangeError,
+    load_robot,
+)
 
 
 def test_a_leg_by_itself_is_a_mechanism_with_limits_at_the_origin():
@@ -21,6 +28,29 @@ def test_one_pair_of_limits_is_that_of_all_actuators_and_none_limits_nothing():
     mechanism = ParallelDrive()
     np.testing.assert_array_equal(Leg.of(mechanism, (-7, 8)).effort_limits, [[-7.0, 8.0]] * 3)
     np.testing.assert_array_equal(Leg.of(mechanism).effort_limits, [[-np.inf, np.inf]] * 3)
+
+
+@pytest.mark.parametrize("robot", ["hexapod", "quadruped", "walker", "gantry", "solo12"])
+def test_segments_of_a_leg_connect_the_points_of_its_bars_in_the_base_frame(robot):
+    for leg in load_robot(robot).legs.values():
+        initial = leg.mechanism.initial_posture.joint_positions
+        posture = leg.mechanism.forward(np.stack([initial, initial + 1e-3]))
+        linkage = leg.mechanism.linkage(posture)
+        names = [linkage.names[k] for bar in linkage.bars for k in bar[:-1]]
+        starts = np.stack([linkage.point(name) for name in names], axis=1)
+        segments = leg.segments(posture)
+        assert segments.shape == (2, len(names), 2, 3)
+        np.testing.assert_allclose(leg.mount.to_leg(segments[:, :, 0]), starts, atol=1e-12)
+        polylines = [linkage.points[:, list(bar)] for bar in linkage.bars]
+        length = sum(np.linalg.norm(np.diff(p, axis=1), axis=-1).sum(axis=1) for p in polylines)
+        pieces = np.linalg.norm(segments[:, :, 1] - segments[:, :, 0], axis=-1)
+        np.testing.assert_allclose(pieces.sum(axis=1), length, atol=1e-12)
+
+
+def test_a_point_that_a_linkage_lacks_is_told_with_those_it_has():
+    leg = ParallelDrive()
+    with pytest.raises(UnknownNameError, match="R_D1"):
+        leg.linkage(leg.initial_posture).point("Q")
 
 
 @pytest.mark.parametrize("limits", [np.zeros((2, 2)), np.zeros((3, 3)), np.zeros((1, 3, 2))])
