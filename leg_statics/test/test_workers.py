@@ -148,7 +148,7 @@ class Cluster:
         return json.loads(self.file.read_text())["address"]
 
     def stop(self):
-        # A Dask worker that is asked to end says goodbye to its scheduler first, also to a lost one.
+        # A Dask worker that is asked to end says goodbye to its scheduler, even to a lost one.
         for process in [*self.workers, self.scheduler]:
             process.kill()
         for process in [*self.workers, self.scheduler]:
