@@ -40,7 +40,8 @@ from leg_kinematics.documents import FOREIGN_NAME, NAME, PAIR, VECTOR, Document,
 from leg_kinematics.errors import DescriptionError, GeometryError, UnknownNameError
 from leg_kinematics.files import existing_path
 from leg_kinematics.mechanism import Joint
-from leg_kinematics.mechanisms.model_leg import ModelLeg, model_leg
+from leg_kinematics.mechanisms.leg_of_tree import leg_of_tree
+from leg_kinematics.mechanisms.model_leg import ModelLeg
 from leg_kinematics.model.leg_tree import Foot, LegTree, leg_tree, with_numbers
 from leg_kinematics.model.reading import read_closures, read_model
 from leg_kinematics.model.tree import Closure, ModelTree
@@ -189,7 +190,7 @@ class ModelDescription:
             tree = self._with_limits(tree)
             present = {joint.name for joint in tree.joints}
             driven = [joint for joint in self._actuated() if joint in present]
-            return model_leg(tree, driven, self._assembly(name)), tree
+            return leg_of_tree(tree, driven, self._assembly(name)), tree
         except (GeometryError, UnknownNameError) as error:
             raise self.document.error(str(error), "legs", name) from None
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from leg_kinematics.mechanisms.model_leg import model_leg
+from leg_kinematics.mechanisms.leg_of_tree import leg_of_tree
 from leg_kinematics.model.leg_tree import Foot, leg_tree
 from leg_kinematics.model.tree import Closure
 from leg_kinematics.model.urdf import read_urdf
@@ -65,14 +65,14 @@ FIVE_BAR_ASSEMBLY = {
 def serial_leg():
     """Return a leg whose hip rolls and pitches and whose knee bends."""
     tree = leg_tree(SERIAL, "base", Foot("toe"))
-    return model_leg(tree, assembly={"initial": {"thigh": -0.5, "knee": 1.1}})
+    return leg_of_tree(tree, assembly={"initial": {"thigh": -0.5, "knee": 1.1}})
 
 
 def five_bar():
     """Return a leg whose knee is driven through a five-bar."""
     closed = type(FIVE_BAR)(FIVE_BAR.name, FIVE_BAR.links, FIVE_BAR.joints, (MEET,), FIVE_BAR.place)
     tree = leg_tree(closed, "base", Foot("shin", (0.0, 0.0, -0.3)))
-    return model_leg(tree, assembly=FIVE_BAR_ASSEMBLY)
+    return leg_of_tree(tree, assembly=FIVE_BAR_ASSEMBLY)
 
 
 MODEL_LEGS = {"serial model": serial_leg(), "five-bar model": five_bar()}

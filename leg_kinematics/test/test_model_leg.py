@@ -13,7 +13,9 @@ from mechanism_zoo import joint_distance, random_joints
 from model_legs import FIVE_BAR, MEET, SERIAL, five_bar, joint, serial_leg, urdf
 
 from leg_kinematics import DescriptionError, GeometryError, Status, load_robot
-from leg_kinematics.mechanisms.model_leg import NewtonLeg, SerialLeg, model_leg
+from leg_kinematics.mechanisms.leg_of_tree import leg_of_tree
+from leg_kinematics.mechanisms.newton_leg import NewtonLeg
+from leg_kinematics.mechanisms.serial_leg import SerialLeg
 from leg_kinematics.model.leg_tree import Foot, leg_tree
 from leg_kinematics.model.postures import loop_state
 
@@ -50,7 +52,7 @@ def test_every_solution_of_a_random_leg_is_one_of_the_modes(seed, kind):
     )  # fmt: skip
     start = rng.uniform(-2.0, 2.0, 3).tolist()
     assembly = {"initial": dict(zip(("j0", "j1", "j2"), start, strict=True))}
-    leg = model_leg(leg_tree(tree, "b", Foot("l3", tuple(places[3]))), assembly=assembly)
+    leg = leg_of_tree(leg_tree(tree, "b", Foot("l3", tuple(places[3]))), assembly=assembly)
     assert isinstance(leg, SerialLeg)
     q = random_joints(leg, 300, seed)
     one_mode = np.zeros(len(q), dtype=int)
@@ -172,26 +174,26 @@ WRONG_LEGS = {
     "foot not below": (lambda: leg_tree(SERIAL, "shin", Foot("base")), "not below 'shin'"),
     "foot on the base": (lambda: leg_tree(SERIAL, "shin", Foot("toe")), "no joint moves 'toe'"),
     "too few actuators": (
-        lambda: model_leg(leg_tree(closed(MEET), "base", Foot("shin")), ["hip", "thigh"]),
+        lambda: leg_of_tree(leg_tree(closed(MEET), "base", Foot("shin")), ["hip", "thigh"]),
         "3 freedom.*2 actuated",
     ),
     "too many actuators": (
-        lambda: model_leg(
+        lambda: leg_of_tree(
             leg_tree(closed(MEET), "base", Foot("shin")), ["hip", "thigh", "crank", "knee"]
         ),
         "3 freedom.*4 actuated",
     ),
     "a loop that does not close": (
-        lambda: model_leg(leg_tree(closed(MEET._replace(first_points=np.array([[0, 0.3, 0.0]]))),
+        lambda: leg_of_tree(leg_tree(closed(MEET._replace(first_points=np.array([[0, 0.3, 0.0]]))),
                                    "base", Foot("shin"))),
         "loops do not close",
     ),
     "an unknown joint": (
-        lambda: model_leg(leg_tree(SERIAL, "base", Foot("toe")), ["ankel"]),
+        lambda: leg_of_tree(leg_tree(SERIAL, "base", Foot("toe")), ["ankel"]),
         "no joint 'ankel'.*knee",
     ),
     "straight": (
-        lambda: model_leg(leg_tree(SERIAL, "base", Foot("shin", (0.0, 0.0, -0.3))),
+        lambda: leg_of_tree(leg_tree(SERIAL, "base", Foot("shin", (0.0, 0.0, -0.3))),
                           assembly={"initial": {"knee": 0.0}}),
         "singular",
     ),

@@ -29,6 +29,7 @@ from leg_kinematics.model.tree import Closure, ModelJoint, ModelTree
 Vector = tuple[float, float, float]
 MOST_JOINTS = 40  # of a leg
 BASE = 0  # the body that does not move
+WHOLE_TURN = 2.0 * math.pi - 1e-9  # rad, the least range of a joint that nothing bounds
 STRAIGHT = 1e-12  # components of axes and offsets below that are rounding
 
 

@@ -1,21 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Legs of any chain, by Newton's method along paths from known postures.
+"""Newton's method along paths from known postures, for legs of any chain.
 
-Unknown are all joint positions, actuated a and passive p. Equations are the coincidences that close
-the loops, c(a, p) = 0, and the foot, f(a, p). A step of Newton's method eliminates the passive
-joints, by which the Jacobians of the leg come along:
+With the equations and the elimination of `equations`, a step is
 
-    C_p X = C_a,   C_p y = c        (elimination with pivots)
-    J = F_a - F_p X                 foot by actuated joints, the loops closed
     J da = (foot - f) + F_p y,      dp = -y - X da
 
 A posture is followed from a known one along a straight line, of the foot or of the actuated joints,
 in steps that are halved until Newton's method settles from each to the next and neither det C_p nor
 det J has changed its sign, that is, no singularity was passed. So an answer depends on nothing but
-its point, and stays on its branch.
-
-Each coincidence is three equations in axes of its first body. Where loops are plane some are always
-fulfilled; `rows` are those that are independent. At the end all must hold.
+its point, and stays on its branch. At the end all coincidences must hold.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -23,21 +16,14 @@ fulfilled; `rows` are those that are independent. At the end all must hold.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from leg_kinematics.arrays import FloatArray
 from leg_kinematics.kernels.kernel import scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
-from leg_kinematics.model.chain import (
-    PARENT,
-    fill_foot_columns,
-    fill_weights,
-    joint_moves,
-    place_bodies,
-    point_of,
-)
+from leg_kinematics.model.chain import point_of
+from leg_kinematics.model.equations import DEAD_CENTRE, Equations, evaluate, new_room
 from leg_kinematics.status import Status
 
 UNREACHABLE, INVALID_INPUT = int(Status.UNREACHABLE), int(Status.INVALID_INPUT)
@@ -49,156 +35,6 @@ JOINTS, FOOT = 0, 1  # what a posture is followed by
 SMALLEST_STEP = 1.0 / 256.0  # of a path
 LONGEST_TURN = 0.6  # rad or m, of a joint in one step of Newton's method
 MOST_ITERATIONS = 12
-DEAD_CENTRE = 1e-9  # pivots of C_p and det J relative to their sizes
-
-
-class Equations(NamedTuple):
-    """What is solved for a leg.
-
-    Attributes:
-        chain: One row a joint (N, 8), see `LegTree.chain`.
-        loops: One row a coincidence (L, 8), see `LegTree.loops`.
-        foot: Body and point of the foot (4,).
-        rows: Equations of the coincidences that are independent (m,).
-        actuated: Numbers of the actuated joints (n,).
-        passive: Numbers of the passive joints (m,).
-        rest: Actuated joints of the initial posture (n,).
-        signs: Signs that det C_p and det J keep (2,); 0 for one that may have either.
-    """
-
-    chain: FloatArray
-    loops: FloatArray
-    foot: FloatArray
-    rows: FloatArray
-    actuated: FloatArray
-    passive: FloatArray
-    rest: FloatArray
-    signs: FloatArray
-
-
-class Found(NamedTuple):
-    """Room for what is found of one posture.
-
-    Attributes:
-        rotations: Of the bodies (N + 1, 3, 3).
-        origins: Of the bodies (N + 1, 3).
-        axes: Of the joints (N, 3).
-        values: The equations of all coincidences (3 L,).
-        columns: Their derivatives (3 L, N).
-        work: C_p (m, m), and beside it X (m, n) and y (m, 1).
-        foot: Twist of the foot's body by all joints (6, N).
-        twist: J above J_omega (6, n).
-        step: Of the actuated joints (n,).
-        away: From the initial posture (n,).
-        error: Of the foot (3,).
-    """
-
-    rotations: FloatArray
-    origins: FloatArray
-    axes: FloatArray
-    values: FloatArray
-    columns: FloatArray
-    work: FloatArray
-    foot: FloatArray
-    twist: FloatArray
-    step: FloatArray
-    away: FloatArray
-    error: FloatArray
-
-
-@scalar
-def new_room(joints, coincidences, n):
-    """Return room for a leg with so many joints, coincidences and actuators."""
-    m = joints - n
-    return Found(
-        np.empty((joints + 1, 3, 3)),
-        np.empty((joints + 1, 3)),
-        np.empty((joints, 3)),
-        np.empty(3 * coincidences),
-        np.empty((3 * coincidences, joints)),
-        np.empty((m, m + n + 1)),
-        np.empty((6, joints)),
-        np.empty((6, n)),
-        np.empty(n),
-        np.empty(n),
-        np.empty(3),
-    )
-
-
-@scalar
-def fill_loops(chain, loops, room):
-    """Fill the equations of all coincidences (3 L,) and their derivatives (3 L, N)."""
-    rotations, origins, axes = room.rotations, room.origins, room.axes
-    values, columns = room.values, room.columns
-    columns[:, :] = 0.0
-    for i in range(len(loops)):
-        first, second = int(loops[i, 0]), int(loops[i, 4])
-        a = point_of(rotations, origins, first, loops[i, 1], loops[i, 2], loops[i, 3])
-        b = point_of(rotations, origins, second, loops[i, 5], loops[i, 6], loops[i, 7])
-        frame = rotations[first]
-        for r in range(3):
-            values[3 * i + r] = (
-                frame[0, r] * (b[0] - a[0])
-                + frame[1, r] * (b[1] - a[1])
-                + frame[2, r] * (b[2] - a[2])
-            )
-        for side in range(2):
-            body, sign = (first, -1.0) if side == 0 else (second, 1.0)
-            x, y, z = a if side == 0 else b
-            while body > 0:
-                k = body - 1
-                vx, vy, vz = joint_moves(chain, k, origins, axes, x, y, z)
-                for r in range(3):
-                    columns[3 * i + r, k] += sign * (
-                        frame[0, r] * vx + frame[1, r] * vy + frame[2, r] * vz
-                    )
-                body = int(chain[k, PARENT])
-
-
-@scalar
-def eliminate(rows, actuated, passive, room):
-    """Solve C_p (X, y) = (C_a, c) into the right of `work` (m, m + n + 1).
-
-    Returns:
-        The sign of det C_p, 0 where the passive joints are not determined.
-    """
-    values, columns, work = room.values, room.columns, room.work
-    m, n = len(passive), len(actuated)
-    sign = 1.0
-    for r in range(m):
-        row = int(rows[r])
-        for c in range(m):
-            work[r, c] = columns[row, int(passive[c])]
-        for c in range(n):
-            work[r, m + c] = columns[row, int(actuated[c])]
-        work[r, m + n] = values[row]
-    for c in range(m):
-        best, size = c, abs(work[c, c])
-        for r in range(c + 1, m):
-            if abs(work[r, c]) > size:
-                best, size = r, abs(work[r, c])
-        if not size > DEAD_CENTRE:
-            return 0.0
-        if best != c:
-            sign = -sign
-            for k in range(c, m + n + 1):
-                work[c, k], work[best, k] = work[best, k], work[c, k]
-        if work[c, c] < 0.0:
-            sign = -sign
-        inverse = 1.0 / work[c, c]
-        for r in range(c + 1, m):
-            factor = work[r, c] * inverse
-            if factor != 0.0:
-                for k in range(c + 1, m + n + 1):
-                    work[r, k] -= factor * work[c, k]
-    for c in range(m - 1, -1, -1):
-        inverse = 1.0 / work[c, c]
-        for k in range(m, m + n + 1):
-            total = work[c, k]
-            for j in range(c + 1, m):
-                total -= work[c, j] * work[j, k]
-            work[c, k] = total * inverse
-    return sign
 
 
 @scalar
@@ -261,33 +97,6 @@ def solve_actuated(twist, error, away, step):
             for r in range(3):
                 step[j] += twist[r, j] * gram[r, k] / gram[r, r]
     return smallest
-
-
-@scalar
-def evaluate(leg, q, room):
-    """Find what there is to know at joint positions: loops, foot, both Jacobians.
-
-    Returns:
-        The foot, the largest remainder of a loop and the sign of det C_p.
-    """
-    place_bodies(leg.chain, q, room.rotations, room.origins, room.axes)
-    m, n = len(leg.passive), len(leg.actuated)
-    sign, open_by = 1.0, 0.0
-    if m:
-        fill_loops(leg.chain, leg.loops, room)
-        for r in range(len(room.values)):
-            open_by = max(open_by, abs(room.values[r]))
-        sign = eliminate(leg.rows, leg.actuated, leg.passive, room)
-    x, y, z = fill_foot_columns(
-        leg.chain, leg.foot, room.rotations, room.origins, room.axes, room.foot
-    )
-    for r in range(6):
-        for c in range(n):
-            total = room.foot[r, int(leg.actuated[c])]
-            for k in range(m):
-                total -= room.foot[r, int(leg.passive[k])] * room.work[k, m + c]
-            room.twist[r, c] = total if sign != 0.0 else math.nan
-    return (x, y, z), open_by, sign
 
 
 @scalar
@@ -443,56 +252,3 @@ def follow_postures(
                 twist[i] = room.twist
                 continue
         q[i, :], place[i, :], twist[i, :, :], kept[i, :] = math.nan, math.nan, math.nan, math.nan
-
-
-@points_kernel(
-    "(n,8),(l,8),(4),(r),(a),(p),(a),(2),(points,n)->(points,6,a)", "f8 f8 f8 f8 f8 f8 f8 f8 f8 f8"
-)
-def twist_jacobian(
-    chain: Any, loops: Any, foot: Any, rows: Any, actuated: Any, passive: Any, rest: Any,
-    signs: Any, q: Any, twist: Any,
-) -> None:  # fmt: skip
-    """J above J_omega of postures (n,)."""
-    leg = Equations(chain, loops, foot, rows, actuated, passive, rest, signs)
-    room = new_room(len(chain), len(loops), len(actuated))
-    for i in range(len(q)):
-        evaluate(leg, q[i], room)
-        twist[i] = room.twist
-
-
-@points_kernel(
-    "(n,8),(l,8),(n,4),(r),(a),(p),(points,n),(points,3)->(points,a)",
-    "f8 f8 f8 f8 f8 f8 f8 f8 f8",
-)
-def holding_efforts(
-    chain: Any, loops: Any, masses: Any, rows: Any, actuated: Any, passive: Any, q: Any,
-    gravity: Any, efforts: Any,
-) -> None:  # fmt: skip
-    """Efforts of the actuators that hold the links' weight in postures (n,).
-
-    A passive joint bears nothing, so what gravity does to it reaches the actuators: Xᵀ of it.
-    """
-    n, m = len(actuated), len(passive)
-    room, weights = new_room(len(chain), len(loops), n), np.empty(len(chain))
-    for i in range(len(q)):
-        place_bodies(chain, q[i], room.rotations, room.origins, room.axes)
-        fill_weights(chain, masses, gravity[i], room.rotations, room.origins, room.axes, weights)
-        sign = 1.0
-        if m:
-            fill_loops(chain, loops, room)
-            sign = eliminate(rows, actuated, passive, room)
-        for c in range(n):
-            total = -weights[int(actuated[c])]
-            for k in range(m):
-                total += weights[int(passive[k])] * room.work[k, m + c]
-            efforts[i, c] = total if sign != 0.0 else math.nan
-
-
-@points_kernel("(n,8),(points,n)->(points,n,3)", "f8 f8 f8")
-def joint_places(chain: Any, q: Any, places: Any) -> None:
-    """Origins of the joints in the leg frame."""
-    n = len(chain)
-    rotations, origins, axes = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3)), np.empty((n, 3))
-    for i in range(len(q)):
-        place_bodies(chain, q[i], rotations, origins, axes)
-        places[i] = origins[1:]

@@ -16,8 +16,8 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.model import newton
 from leg_kinematics.model.chain import place_bodies
+from leg_kinematics.model.equations import DEAD_CENTRE, Equations, fill_loops, new_room
 from leg_kinematics.model.leg_tree import LegTree
-from leg_kinematics.model.newton import Equations
 
 SPACING = 0.25  # rad or m between neighbours of the grid, if that does not make it too large
 MOST_POSTURES = 20_000
@@ -70,9 +70,9 @@ class Postures(NamedTuple):
 
 def loop_state(tree: LegTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what remains open of the loops (3 L,) [m] and its derivatives (3 L, N)."""
-    room = newton.new_room(len(tree.joints), len(tree.loops), 0)
+    room = new_room(len(tree.joints), len(tree.loops), 0)
     place_bodies(tree.chain, q, room.rotations, room.origins, room.axes)
-    newton.fill_loops(tree.chain, tree.loops, room)
+    fill_loops(tree.chain, tree.loops, room)
     return room.values, room.columns
 
 
@@ -157,7 +157,7 @@ def known_postures(equations: Equations, limits: FloatArray, initial: FloatArray
         all_joints = np.concatenate(joints)
         reached, places, determinants = follow(all_joints[sources], goals, signs)
         good = np.isfinite(reached).all(axis=1) & np.all(determinants * signs >= 0.0, axis=1)
-        good &= np.abs(determinants[:, 1]) > newton.DEAD_CENTRE
+        good &= np.abs(determinants[:, 1]) > DEAD_CENTRE
         joints.append(reached[good])
         feet.append(places[good])
         joints, feet = [np.concatenate(joints)], [np.concatenate(feet)]
