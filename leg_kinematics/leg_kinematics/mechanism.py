@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, StatusArray
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import NotSupportedError, UnknownNameError
 
 POINT_FOOT = ("x", "y", "z")  # task coordinates of a foot that the ground can push
@@ -241,6 +242,12 @@ class Mechanism(ABC):
     def linkage(self, posture: Posture) -> Linkage:
         """Points and bars of the leg in this posture."""
 
+    def positions_by_name(self, posture: Posture) -> dict[str, FloatArray]:
+        """Positions (...) of all joints by name, the actuated ones first [rad or m]."""
+        names = [joint.name for joint in (*self.joints, *self.passive_joints)]
+        parts = posture.joint_positions, self.passive_joint_positions(posture)
+        return dict(zip(names, np.moveaxis(np.concatenate(parts, axis=-1), -1, 0), strict=True))
+
     def twist_jacobian(self, posture: Posture) -> FloatArray:
         """`jacobian` above `angular_jacobian` (..., t + 3, n): the twist of the foot's body."""
         return np.concatenate([self.jacobian(posture), self.angular_jacobian(posture)], axis=-2)
@@ -277,6 +284,32 @@ class Mechanism(ABC):
             NotSupportedError: If the mechanism does not tell them.
         """
         raise NotSupportedError(f"mechanism {self.name!r} does not tell accelerations")
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """The bodies of the leg and the joints between them, an optional ability.
+
+        Joints have the mechanism's names, zeros and senses; loops are cut at points that two bodies
+        share. Masses and efforts are not told by dimensions.
+
+        Args:
+            assembly_mode: One of `assembly_modes`; "" is the first. Modes that turn a body over
+                have other bodies.
+
+        Raises:
+            NotSupportedError: If the mechanism does not tell its bodies.
+            UnknownNameError: If there is no such mode.
+            GeometryError: If the loops close nowhere in this mode.
+        """
+        raise NotSupportedError(f"mechanism {self.name!r} does not tell its bodies")
+
+    def tree_positions(self, posture: Posture) -> FloatArray:
+        """Positions of the joints of `body_tree` in their order (..., N) [rad or m].
+
+        Raises:
+            NotSupportedError: If the mechanism does not tell its bodies.
+        """
+        positions = self.positions_by_name(posture)
+        return np.stack([positions[joint.name] for joint in self.body_tree().joints], axis=-1)
 
     def constraint_jacobian(self, posture: Posture) -> FloatArray:
         """Constraint wrenches of the drive (..., c, 6), force then moment; an optional ability.

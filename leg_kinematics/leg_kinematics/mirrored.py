@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import NotSupportedError
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Mechanism, Posture
 
@@ -120,6 +121,10 @@ class Mirrored(Mechanism):
         """Excursions of the passive joints (..., e)."""
         return self.original.passive_joint_excursions(_reflected(posture))
 
+    def positions_by_name(self, posture: Posture) -> dict[str, FloatArray]:
+        """Positions of all joints by name (...)."""
+        return self.original.positions_by_name(_reflected(posture))
+
     def planar_jacobian(self, posture: Posture) -> FloatArray:
         """Jacobian of the foot in the leg's plane (..., 2, 2): forward and up are kept."""
         return self.original.planar_jacobian(_reflected(posture))
@@ -130,6 +135,10 @@ class Mirrored(Mechanism):
         """Efforts that hold the links' own weight (..., n) [N.m or N]."""
         vector = as_array("gravity", gravity, 3)
         return self.original.holding_efforts(_reflected(posture), vector * VECTOR)
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """The mirror images of the leg's bodies."""
+        return self.original.body_tree(assembly_mode).reflected()
 
     @property
     def initial_posture(self) -> Posture:

@@ -36,15 +36,17 @@ from typing import Any
 
 import numpy as np
 
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.documents import FOREIGN_NAME, NAME, PAIR, VECTOR, Document, mapping_schema
 from leg_kinematics.errors import DescriptionError, GeometryError, UnknownNameError
 from leg_kinematics.files import existing_path
 from leg_kinematics.mechanism import Joint
 from leg_kinematics.mechanisms.leg_of_tree import leg_of_tree
 from leg_kinematics.mechanisms.model_leg import ModelLeg
-from leg_kinematics.model.leg_tree import Foot, LegTree, leg_tree, with_numbers
+from leg_kinematics.model.leg_tree import Foot, leg_tree, with_numbers
 from leg_kinematics.model.reading import read_closures, read_model
 from leg_kinematics.model.tree import Closure, ModelTree
+from leg_kinematics.placed_joints import PIN_LENGTH
 from leg_kinematics.robot import Leg, Mount
 
 EFFORT = {
@@ -268,9 +270,6 @@ class ModelDescription:
 
     def _unknown(self, kind: str, name: str, allowed: Any, *where: Any) -> DescriptionError:
         return self.document.error(str(UnknownNameError(kind, str(name), allowed)), *where)
-
-
-PIN_LENGTH = 0.1  # m, between the two points that a pin keeps together
 
 
 def model_path(document: Document, file: str, key: str) -> Path:

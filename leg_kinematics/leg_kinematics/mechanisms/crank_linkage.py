@@ -23,11 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching, wrapped_angles
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned
 from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE
 from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.mechanisms.crank_kernels import Kernels, near_brackets
+from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
@@ -106,6 +108,9 @@ class CrankLinkage(Dimensioned):
     pivots: ClassVar[tuple[Pivot, ...]]
     crank_points: ClassVar[tuple[str, ...]] = ("A", "B")  # points of the crank's body
     bars: ClassVar[tuple[tuple[str, ...], ...]]
+
+    placed: ClassVar[tuple[tuple[str, str, str], ...]]  # joints of the tree, see `PlacedJoint`
+    meetings: ClassVar[tuple[Meeting, ...]]  # where its loops are cut
 
     crank: ClassVar[float] = 1.0  # A B, the unit of all ratios
 
@@ -458,6 +463,30 @@ class CrankLinkage(Dimensioned):
         first = points[..., [index(p.first) for p in self.pivots], :] - pivot
         second = points[..., [index(p.second) for p in self.pivots], :] - pivot
         return _direction(first), _direction(second)
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """The bars as bodies; `c_foot` moves that of the foot."""
+        mode = self.mode_index(assembly_mode)
+        if mode not in self._trees:
+            joints = [PlacedJoint(*placed, (0.0, 1.0, 0.0)) for placed in self.placed]
+            self._trees[mode] = tree_of(
+                self, self._closed_posture(assembly_mode), joints, self.meetings, ("G", "c_foot")
+            )
+        return self._trees[mode]
+
+    @cached_property
+    def _trees(self) -> dict[int, LegTree]:
+        return {}
+
+    def _closed_posture(self, assembly_mode: str) -> Posture:
+        """Return the posture at zero, or the middle of where the bars close."""
+        posture = self.forward(np.zeros(1), assembly_mode)
+        if np.isfinite(posture.foot_position).all():
+            return posture
+        ranges = self._closing_ranges(self.mode_index(assembly_mode))
+        if not ranges:
+            raise GeometryError(f"the bars close nowhere in assembly mode {assembly_mode!r}")
+        return self.forward([0.5 * sum(ranges[0]) - self.crank_zero], assembly_mode)
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them."""

@@ -43,12 +43,14 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
+from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
@@ -409,6 +411,8 @@ PINS = (
     Pin("swing_pin_leg", 9, 1.0, 0.0),
 )
 
+GUIDE = Joint("foot_guide", "prismatic")  # from I to G
+
 # The initial posture: phi = 0, theta = 45°, psi_s = 0.
 INITIAL_CLOSURE = (1.25 * math.pi, 1.75 * math.pi, 0.0)
 
@@ -615,6 +619,57 @@ class DoubleRhombus(Dimensioned):
         swung frame (B, C); the side swing psi_s; its cylinder against the body and the leg.
         """
         return _excursions(self._geometry, posture.closure, self._rest)
+
+    def positions_by_name(self, posture: Posture) -> dict[str, FloatArray]:
+        """Positions (...) of all joints by name, and of the guide that holds the foot in line."""
+        positions = super().positions_by_name(posture)
+        return positions | {GUIDE.name: 2.0 * self.rhombus_side * np.cos(positions["foot"])}
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """Cranks, rhombi and cylinders, cut at A, D, L, G and I, in any mode.
+
+        The foot's body turns about I and is held in line with I O by a guide, which slides from I
+        to G.
+        """
+        self.mode_index(assembly_mode)
+        return self._tree
+
+    @cached_property
+    def _tree(self) -> LegTree:
+        linkage = self.linkage(self.initial_posture)
+        right, forward = (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
+
+        def along(first: str, second: str) -> FloatArray:
+            return linkage.point(second) - linkage.point(first)
+
+        joints = (
+            PlacedJoint("swing_axis", "", "O", forward),
+            PlacedJoint("swing_pin_body", "", "K", forward),
+            PlacedJoint("swing_cylinder", "swing_pin_body", "L", along("K", "L")),
+            PlacedJoint("hip_upper_crank", "swing_axis", "O", right),
+            PlacedJoint("hip_lower_crank", "swing_axis", "O", right),
+            PlacedJoint("upper_pin_b", "swing_axis", "B", right),
+            PlacedJoint("upper_cylinder", "upper_pin_b", "A", along("B", "A")),
+            PlacedJoint("lower_pin_c", "swing_axis", "C", right),
+            PlacedJoint("lower_cylinder", "lower_pin_c", "D", along("C", "D")),
+            PlacedJoint("f", "hip_upper_crank", "F", right),
+            PlacedJoint("e", "hip_lower_crank", "E", right),
+            PlacedJoint("h", "e", "H", right),
+            PlacedJoint("j", "f", "J", right),
+            PlacedJoint("foot", "h", "I", right),
+            PlacedJoint(GUIDE.name, "foot", "G", along("I", "G")),
+        )
+        meetings = (
+            Meeting("L", "swing_cylinder", "swing_axis"),
+            Meeting("A", "upper_cylinder", "hip_upper_crank"),
+            Meeting("D", "lower_cylinder", "hip_lower_crank"),
+            Meeting("G", "e", "f"),
+            Meeting("I", "h", "j"),
+            Meeting("G", GUIDE.name, "f"),
+        )
+        return tree_of(
+            self, self.initial_posture, joints, meetings, ("I", "foot"), {GUIDE.name: GUIDE}
+        )
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the leg in the leg frame and the bars between them.

@@ -43,6 +43,7 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
@@ -50,6 +51,7 @@ from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
+from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, PASSIVE_JOINT_LIMIT, SINGULAR, INVALID_INPUT = map(int, Status)
@@ -696,6 +698,39 @@ class GantryHybrid(Dimensioned):
             self._geometry, posture.joint_positions, posture.closure, self._rest
         )
         return excursions
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """Slides, bars, rod and platform, cut at B' and at C', in any mode.
+
+        The auxiliary shaft, which holds nothing, is left out.
+        """
+        self.mode_index(assembly_mode)
+        return self._tree
+
+    @cached_property
+    def _tree(self) -> LegTree:
+        x, y = np.eye(3)[:2]
+        linkage = self.linkage(self.initial_posture)
+        rod = linkage.point("C'") - linkage.point("C''")
+        across = np.cross(rod, x)
+        joints = (
+            PlacedJoint("s2", "", "O'", y),
+            PlacedJoint("s1", "s2", "A''", x),
+            PlacedJoint("s3", "s2", "B''", x),
+            PlacedJoint("s4", "s2", "C''", x),
+            PlacedJoint("bar_a_slide", "s1", "A''", -y),
+            PlacedJoint("bar_b_slide", "s3", "B''", -y),
+            PlacedJoint("bar_a_hinge", "bar_a_slide", "A'", -y),
+            PlacedJoint("platform_hinge", "bar_a_hinge", "O''", x),
+            PlacedJoint("rod_slide_along", "s4", "C''", x),
+            PlacedJoint("rod_slide_across", "rod_slide_along", "C''", across),
+            PlacedJoint("rod_platform_across", "rod_slide_across", "C'", across),
+        )
+        meetings = (
+            Meeting("B'", "bar_b_slide", "bar_a_hinge"),
+            Meeting("C'", "rod_platform_across", "platform_hinge", x),
+        )
+        return tree_of(self, self.initial_posture, joints, meetings, ("O''", "platform_hinge"))
 
     def linkage(self, posture: Posture) -> Linkage:
         """Points of the manipulator in the leg frame and the bars between them.

@@ -9,13 +9,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.mechanisms.model_leg import ModelLeg
 from leg_kinematics.mechanisms.newton_leg import NewtonLeg
 from leg_kinematics.mechanisms.serial_leg import SerialLeg
 from leg_kinematics.model import three_revolute
 from leg_kinematics.model.equations import Equations, evaluate, new_room
-from leg_kinematics.model.leg_tree import WHOLE_TURN, LegTree
+from leg_kinematics.model.leg_tree import WHOLE_TURN
 from leg_kinematics.model.postures import assembled, independent_rows
 from leg_kinematics.status import Status
 

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.geometry import check_ranges
 from leg_kinematics.mechanism import Joint, Linkage, Mechanism, Posture
 from leg_kinematics.model import solved
 from leg_kinematics.model.equations import Equations
-from leg_kinematics.model.leg_tree import LegTree
 from leg_kinematics.model.postures import independent_rows
 
 Ranges = tuple[tuple[float, float], ...]
@@ -168,6 +168,11 @@ class ModelLeg(Mechanism):
     def has_masses(self) -> bool:
         """Whether the masses of all moving links are known."""
         return math.isfinite(self.mass)
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """The chain of the leg, that of all assembly modes."""
+        self.mode_index(assembly_mode)
+        return self.tree
 
     def linkage(self, posture: Posture) -> Linkage:
         """Joints, loops' points and foot of this posture; bars connect what is on one body."""

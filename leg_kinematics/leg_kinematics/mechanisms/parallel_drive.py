@@ -34,6 +34,7 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arrays import FloatArray, as_array, has_code, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.geometry import Dimensioned, offset, parameter
 from leg_kinematics.kernels.scalars import direction
@@ -53,11 +54,13 @@ from leg_kinematics.mechanisms.parallel_drive_equations import (
     symmetric_elevation,
 )
 from leg_kinematics.mechanisms.walking_axes import leg_vectors
+from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 
 ACROSS, CONES = [1, 3, 5], [6, 7, 8]  # passive joints told by a sine and by a chord
 RANGE = math.radians(21.0)
 PASSIVE_RANGE = math.radians(45.0)
 FLIPPABLE = ("knee", "center", "crank_1", "crank_2")
+FORWARD, RIGHT = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])  # in the leg frame
 UNIVERSAL_JOINTS = ("u1_along", "u1_across", "u2_along", "u2_across", "u3_along", "u3_across")
 
 
@@ -339,6 +342,43 @@ class ParallelDrive(Dimensioned):
         angles[..., ACROSS] = np.arcsin(measures[..., ACROSS]) - self._across_rest
         angles[..., CONES] = 2.0 * np.arcsin(0.5 * np.sqrt(measures[..., CONES]))
         return angles
+
+    def body_tree(self, assembly_mode: str = "") -> LegTree:
+        """Cranks, rods, platform and pantograph, cut at S1, S2, S and R2, in any mode.
+
+        A universal joint is two joints with a cross between them.
+        """
+        self.mode_index(assembly_mode)
+        return self._tree
+
+    @cached_property
+    def _tree(self) -> LegTree:
+        linkage = self.linkage(self.initial_posture)
+        hip, thigh, link = (linkage.point(name) for name in ("H", "R1", "R2"))
+        plane = np.cross(link - thigh, hip - thigh)
+        plane = plane * np.sign(plane @ RIGHT)
+        joints = []
+        for k, end in (("1", "S1"), ("2", "S2"), ("3", "G")):
+            along = linkage.point(end) - linkage.point(f"U{k}")
+            joints += [
+                PlacedJoint(f"crank_{k}", "", f"R_D{k}", RIGHT),
+                PlacedJoint(f"u{k}_along", f"crank_{k}", f"U{k}", RIGHT),
+                PlacedJoint(f"u{k}_across", f"u{k}_along", f"U{k}", np.cross(along, RIGHT)),
+            ]
+        joints += [
+            PlacedJoint("hip_swing", "", "H", FORWARD),
+            PlacedJoint("hip_thigh", "hip_swing", "H", plane),
+            PlacedJoint("r1", "hip_thigh", "R1", plane),
+            PlacedJoint("r3", "hip_thigh", "R3", plane),
+            PlacedJoint("r5", "r3", "R5", plane),
+        ]
+        meetings = (
+            Meeting("S1", "u1_across", "u3_across"),
+            Meeting("S2", "u2_across", "u3_across"),
+            Meeting("S", "u3_across", "r1"),
+            Meeting("R2", "r1", "r5"),
+        )
+        return tree_of(self, self.initial_posture, joints, meetings, ("C", "r5"))
 
     def constraint_jacobian(self, posture: Posture) -> FloatArray:
         """J_c of the drive's constraint wrenches (..., 3, 6): equations (8), (12), (13).

@@ -40,6 +40,7 @@ from leg_kinematics.mechanisms.dyads import (
     transmission,
     triangle_coefficients,
 )
+from leg_kinematics.placed_joints import Meeting
 
 
 class Geometry(NamedTuple):
@@ -180,6 +181,15 @@ class SixBar(CrankLinkage):
     crank_points: ClassVar[tuple[str, ...]] = ("A", "B", "E")
     bars: ClassVar[tuple[tuple[str, ...], ...]] = (
         *(("A", "B", "E", "A"), ("B", "C"), ("C", "D"), ("E", "F"), ("C", "F", "G", "C")),
+    )
+
+    placed: ClassVar[tuple[tuple[str, str, str], ...]] = (
+        *(("crank", "", "A"), ("d", "", "D"), ("c_foot", "d", "C")),
+        *(("b", "crank", "B"), ("e", "crank", "E")),
+    )
+    meetings: ClassVar[tuple[Meeting, ...]] = (
+        Meeting("C", "b", "d"),
+        Meeting("F", "e", "c_foot"),
     )
 
     crank_length: float = parameter("crank A B", "l_AB", "length", 0.015)

@@ -39,6 +39,7 @@ from leg_kinematics.mechanisms.dyads import (
     transmission,
     triangle_coefficients,
 )
+from leg_kinematics.placed_joints import Meeting
 
 
 class Geometry(NamedTuple):
@@ -192,6 +193,17 @@ class TheoJansen(CrankLinkage):
     bars: ClassVar[tuple[tuple[str, ...], ...]] = (
         *(("A", "B"), ("B", "U"), ("B", "C"), ("D", "U", "L", "D"), ("C", "D")),
         *(("L", "F"), ("C", "F", "G", "C")),
+    )
+
+    placed: ClassVar[tuple[tuple[str, str, str], ...]] = (
+        *(("crank", "", "A"), ("d_lower", "", "D"), ("d_upper", "", "D")),
+        *(("b_lower", "crank", "B"), ("b_upper", "crank", "B")),
+        *(("c_foot", "d_lower", "C"), ("l", "d_upper", "L")),
+    )
+    meetings: ClassVar[tuple[Meeting, ...]] = (
+        Meeting("C", "b_lower", "d_lower"),
+        Meeting("U", "b_upper", "d_upper"),
+        Meeting("F", "l", "c_foot"),
     )
 
     crank_length: float = parameter("crank A B", "m", "length", 0.015)

@@ -1,13 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One leg of a robot model, as little as its mathematics needs: moving joints, loops, foot, masses.
 
-Bodies are numbered: 0 is the base, k + 1 is what joint k moves. With all joints at zero every
-body's frame has the axes of the base, and its origin is on its joint. A posture is therefore found
-without any constant rotation:
-
-    R_(k+1) = R_parent Rot(axis_k, q_k)       p_(k+1) = p_parent + R_parent offset_k      (revolute)
-    R_(k+1) = R_parent     p_(k+1) = p_parent + R_parent (offset_k + axis_k q_k)         (prismatic)
-
 The leg frame has the axes of the base, and its origin in that of the first joint on the way to the
 foot.
 """
@@ -16,21 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from leg_kinematics.arrays import FloatArray
+from leg_kinematics.bodies import Coincidence, LegJoint, LegTree, Vector, as_vector
 from leg_kinematics.errors import DescriptionError
 from leg_kinematics.model.tree import Closure, ModelJoint, ModelTree
 
-Vector = tuple[float, float, float]
 MOST_JOINTS = 40  # of a leg
-BASE = 0  # the body that does not move
 WHOLE_TURN = 2.0 * math.pi - 1e-9  # rad, the least range of a joint that nothing bounds
-STRAIGHT = 1e-12  # components of axes and offsets below that are rounding
 
 
 class Foot(NamedTuple):
@@ -43,96 +32,6 @@ class Foot(NamedTuple):
 
     link: str
     position: Vector = (0.0, 0.0, 0.0)
-
-
-class LegJoint(NamedTuple):
-    """A joint of a leg and the body it moves.
-
-    Attributes:
-        name: Name of the joint.
-        type: "revolute" or "prismatic".
-        parent: Number of the body it stands on.
-        axis: Unit vector, all joints at zero.
-        offset: From the parent's origin to the joint, all joints at zero [m].
-        limits: Range of the joint position [rad or m].
-        effort: Least and most effort of its actuator [N.m or N]; None without one.
-        mass: Mass of the body [kg]; NaN if the file does not tell.
-        centre: The body's centre of mass from its origin, all joints at zero [m].
-    """
-
-    name: str
-    type: Literal["revolute", "prismatic"]
-    parent: int
-    axis: Vector
-    offset: Vector
-    limits: tuple[float, float]
-    effort: tuple[float, float] | None
-    mass: float
-    centre: Vector
-
-
-class Coincidence(NamedTuple):
-    """A point of one body that stays at a point of another, which closes a loop.
-
-    Attributes:
-        first: Number of a body.
-        first_point: The point from its origin, all joints at zero [m].
-        second: Number of another body.
-        second_point: The same of that one.
-    """
-
-    first: int
-    first_point: Vector
-    second: int
-    second_point: Vector
-
-
-@dataclass(frozen=True)
-class LegTree:
-    """The chain of a leg, open or with loops.
-
-    Attributes:
-        joints: Its joints, each after those that carry it.
-        coincidences: What closes its loops.
-        foot_body: Number of the body with the foot.
-        foot_point: The foot from that body's origin, all joints at zero [m].
-        origin: Origin of the leg frame in the base link's frame [m].
-    """
-
-    joints: tuple[LegJoint, ...]
-    coincidences: tuple[Coincidence, ...]
-    foot_body: int
-    foot_point: Vector
-    origin: Vector
-
-    @cached_property
-    def chain(self) -> FloatArray:
-        """One row a joint: parent, whether it is prismatic, axis, offset (N, 8)."""
-        rows = [(j.parent, j.type == "prismatic", *j.axis, *j.offset) for j in self.joints]
-        return np.array(rows, dtype=np.float64).reshape(-1, 8)
-
-    @cached_property
-    def loops(self) -> FloatArray:
-        """One row a coincidence: body and point of the first, and of the second (L, 8)."""
-        rows = [(c.first, *c.first_point, c.second, *c.second_point) for c in self.coincidences]
-        return np.array(rows, dtype=np.float64).reshape(-1, 8)
-
-    @cached_property
-    def foot(self) -> FloatArray:
-        """Body and point of the foot (4,)."""
-        return np.array([self.foot_body, *self.foot_point])
-
-    @cached_property
-    def masses(self) -> FloatArray:
-        """One row a joint: mass and centre of the body it moves (N, 4)."""
-        rows = [(joint.mass, *joint.centre) for joint in self.joints]
-        return np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-    @property
-    def is_serial(self) -> bool:
-        """Whether each joint stands on the one before it and the foot on the last."""
-        in_line = all(joint.parent == k for k, joint in enumerate(self.joints))
-        return in_line and not self.coincidences and self.foot_body == len(self.joints)
 
 
 def leg_tree(tree: ModelTree, base: str, foot: Foot, held: Sequence[str] = ()) -> LegTree:
@@ -228,7 +127,7 @@ def _compact(
     def point(link: str, position: Any) -> Vector:
         """Return a point of a link from its body's origin, all joints at zero."""
         rotation, place = frames[link]
-        return _vector(place + rotation @ np.asarray(position) - origins[body(link)])
+        return as_vector(place + rotation @ np.asarray(position) - origins[body(link)])
 
     masses = [
         [
@@ -247,8 +146,8 @@ def _compact(
                 joint.name,
                 "prismatic" if joint.type == "prismatic" else "revolute",
                 parent,
-                _vector(frames[joint.child][0] @ joint.axis),
-                _vector(origins[k + 1] - origins[parent]),
+                as_vector(frames[joint.child][0] @ joint.axis),
+                as_vector(origins[k + 1] - origins[parent]),
                 joint.limits,
                 joint.effort,
                 mass,
@@ -265,7 +164,7 @@ def _compact(
         coincidences,
         body(foot.link),
         point(foot.link, foot.position),
-        _vector(origin),
+        as_vector(origin),
     )
 
 
@@ -276,13 +175,7 @@ def _together(parts: Sequence[tuple[float | None, Vector]]) -> tuple[float, Vect
         return math.nan, (0.0, 0.0, 0.0)
     mass = math.fsum(m for m, _ in known)
     moment = sum((m * centre for m, centre in known), np.zeros(3))
-    return mass, _vector(moment / mass) if mass > 0.0 else (0.0, 0.0, 0.0)
-
-
-def _vector(values: FloatArray) -> Vector:
-    """Return three numbers; what is zero but for rounding is zero."""
-    x, y, z = (0.0 if abs(v) < STRAIGHT else float(v) for v in values)
-    return x, y, z
+    return mass, as_vector(moment / mass) if mass > 0.0 else (0.0, 0.0, 0.0)
 
 
 def with_numbers(

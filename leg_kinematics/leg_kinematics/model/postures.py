@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
 from leg_kinematics.model import newton
 from leg_kinematics.model.chain import place_bodies
 from leg_kinematics.model.equations import DEAD_CENTRE, Equations, fill_loops, new_room
-from leg_kinematics.model.leg_tree import LegTree
 
 SPACING = 0.25  # rad or m between neighbours of the grid, if that does not make it too large
 MOST_POSTURES = 20_000

@@ -30,11 +30,11 @@ from typing import Any
 import numpy as np
 
 from leg_kinematics.arrays import FloatArray
+from leg_kinematics.bodies import LegTree
 from leg_kinematics.kernels.kernel import inlined, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import arctan2, direction, within
 from leg_kinematics.kernels.vectors import cross, inner
-from leg_kinematics.model.leg_tree import LegTree
 from leg_kinematics.status import Status
 
 OK, UNREACHABLE, JOINT_LIMIT, _, SINGULAR, INVALID_INPUT = map(int, Status)
