@@ -22,6 +22,7 @@ setup(
     entry_points={
         "console_scripts": [
             "describe_robot = leg_kinematics.describe_robot:main",
+            "export_robot = leg_kinematics.export_robot:main",
             "kinematics_node = leg_kinematics.nodes.entry_points:kinematics_node",
         ],
     },

@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 
 from leg_kinematics.bodies import LegTree
-from leg_kinematics.documents import FOREIGN_NAME, NAME, PAIR, VECTOR, Document, mapping_schema
+from leg_kinematics.documents import FOREIGN_NAME, PAIR, VECTOR, Document, mapping_schema
 from leg_kinematics.errors import DescriptionError, GeometryError, UnknownNameError
 from leg_kinematics.files import existing_path
 from leg_kinematics.mechanism import Joint
@@ -55,6 +55,7 @@ EFFORT = {
 }
 TEXT = {"type": "string", "minLength": 1, "maxLength": 1000}
 TEXTS = {"type": "array", "items": TEXT, "maxItems": 1000}
+MODE = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_+]*$"}  # of the papers' legs, too
 _END = mapping_schema({"link": TEXT, "point": VECTOR, "axis": VECTOR}, ["link", "point"])
 
 
@@ -89,7 +90,7 @@ MODEL_LEG_SCHEMA = mapping_schema(
             "type": "object",
             "minProperties": 1,
             "maxProperties": 64,
-            "propertyNames": NAME,
+            "propertyNames": MODE,
             "additionalProperties": _by_name({"type": "number"}),
         },
         "held": TEXTS,

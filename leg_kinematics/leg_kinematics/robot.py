@@ -134,6 +134,18 @@ class Leg:
         passive = tuple(joint.name for joint in mechanism.passive_joints)
         return cls(name, name, mechanism, mount, name, joints, passive, rows)
 
+    def tree_joint_names(self) -> tuple[str, ...]:
+        """Names in the robot of the joints of the mechanism's `body_tree`, in their order.
+
+        Raises:
+            NotSupportedError: If the mechanism does not tell its bodies.
+        """
+        joints = (*self.mechanism.joints, *self.mechanism.passive_joints)
+        names = (*self.joint_names, *self.passive_joint_names)
+        known = {joint.name: name for joint, name in zip(joints, names, strict=True)}
+        tree = self.mechanism.body_tree()
+        return tuple(known.get(j.name, f"{self.name}_{j.name}") for j in tree.joints)
+
     def segments(self, posture: Posture) -> FloatArray:
         """Return the bars of the leg as straight pieces for drawing.
 
@@ -161,11 +173,13 @@ class Robot:
         name: Name of the robot.
         base_frame: Name of the body's frame.
         legs: The legs by name, in the order of the description.
+        frame_prefix: What stands before the names of its frames, as one of several robots.
     """
 
     name: str
     base_frame: str
     legs: Mapping[str, Leg]
+    frame_prefix: str = ""
 
     def leg(self, name: str) -> Leg:
         """Return a leg by its name; "" is allowed when there is exactly one.
@@ -197,7 +211,12 @@ class Robot:
                 f"frame_prefix: got {prefix!r}; allowed: letters, digits, _ . - and / between"
             )
         legs = {name: replace(leg, frame=f"{prefix}{leg.frame}") for name, leg in self.legs.items()}
-        return replace(self, base_frame=f"{prefix}{self.base_frame}", legs=legs)
+        return replace(
+            self,
+            base_frame=f"{prefix}{self.base_frame}",
+            legs=legs,
+            frame_prefix=f"{prefix}{self.frame_prefix}",
+        )
 
     def effort_limits(self) -> tuple[tuple[str, ...], FloatArray]:
         """Return all joint names and their effort limits (sum of n, 2) [N.m or N]."""

@@ -73,7 +73,7 @@ def leg_tree(tree: ModelTree, base: str, foot: Foot, held: Sequence[str] = ()) -
                 for end in (closure.first, closure.second)
             ]
             touched = any(j.child in bodies for end in ends for j in end or ())
-            if closure in closures or not touched:
+            if any(closure is known for known in closures) or not touched:
                 continue
             if None in ends:
                 raise DescriptionError(

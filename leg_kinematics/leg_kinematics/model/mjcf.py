@@ -17,6 +17,7 @@ from leg_kinematics.errors import DescriptionError
 from leg_kinematics.model.tree import FRAME, Closure, ModelJoint, ModelLink, ModelTree
 
 WORLD = "world"
+LEAST_MASS = 1e-12  # kg, what MuJoCo gives a body without inertia; its mass is not known
 
 
 def read_mjcf(path: Path) -> ModelTree:
@@ -44,7 +45,7 @@ def read_mjcf(path: Path) -> ModelTree:
 def _leave_meshes_out(mujoco: Any, spec: Any) -> set[str]:
     """Take what needs other files out of a model; return the bodies whose mass came from it."""
     without_mass = set()
-    spec.compiler.boundmass = spec.compiler.boundinertia = 1e-12  # a body may be an empty frame
+    spec.compiler.boundmass = spec.compiler.boundinertia = LEAST_MASS  # of an empty frame
     for geom in list(spec.geoms):
         if geom.type in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD):
             if not geom.parent.explicitinertial:
@@ -84,8 +85,9 @@ class _Reader:
 
     def _body(self, k: int) -> None:
         model, name = self.model, self.bodies[k]
-        mass = None if name in self.without_mass else float(model.body_mass[k])
-        self.links[name] = ModelLink(name, mass, model.body_ipos[k].copy())
+        mass = float(model.body_mass[k])
+        known = name not in self.without_mass and mass > LEAST_MASS
+        self.links[name] = ModelLink(name, mass if known else None, model.body_ipos[k].copy())
         joints = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
         types = [int(model.jnt_type[j]) for j in joints]
         if int(self.mujoco.mjtJoint.mjJNT_FREE) in types:
