@@ -11,11 +11,12 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export AMENT_PREFIX_PATH := $(VENV)
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONDONTWRITEBYTECODE
 
-# What `make run` starts.
+# What `make run` starts and `make view` shows.
 ROBOT ?= hexapod
+TERRAIN ?= level
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test test-lowest lint typecheck soak stances bench bench-compare papers clean
+.PHONY: help setup demo run view test test-lowest lint typecheck soak stances bench bench-compare papers clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,6 +27,9 @@ demo: setup  ## Show what the suite answers, on the example robots
 run: setup  ## Start the nodes of a robot: [ROBOT=hexapod] [NAMESPACE=] [GAIT=yes] [PARAMETERS="name:=value ..."]
 	$(VENV_PYTHON) tools/run_robot.py --robot "$(ROBOT)" --namespace "$(NAMESPACE)" \
 		$(if $(GAIT),--gait) $(PARAMETERS)
+
+view: setup  ## Show a robot in the browser: [ROBOT=hexapod] [TERRAIN=level]
+	$(VENV)/lib/leg_statics/viewer --robot "$(ROBOT)" --terrain "$(TERRAIN)"
 
 test: lint typecheck  ## Check style and types, then run every test, two at a time
 	$(VENV_PYTHON) -m pytest -n 2 --dist loadfile

@@ -18,7 +18,7 @@ setup(
     maintainer_email="maintainers@example.org",
     description="What a leg can carry, better dimensions of it, and the nodes that serve both.",
     license="Apache-2.0",
-    extras_require={"test": ["pytest"]},
+    extras_require={"test": ["pytest"], "view": ["viser"]},
     entry_points={
         "console_scripts": [
             "designs_node = leg_statics.nodes.entry_points:designs_node",
@@ -29,6 +29,8 @@ setup(
             "search_geometry = leg_statics.commands.search_geometry:main",
             "synthesize_six_bar = leg_statics.commands.synthesize_six_bar:main",
             "statics_node = leg_statics.nodes.entry_points:statics_node",
+            "viewer = leg_statics.commands.viewer:main",
+            "viewer_node = leg_statics.nodes.entry_points:viewer_node",
         ],
     },
 )

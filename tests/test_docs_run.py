@@ -73,8 +73,8 @@ def execute(line, folder, domain):
 
 
 @contextmanager
-def running(line, nodes):
-    """The nodes that a line starts, in a ROS domain of their own; they end as by Ctrl-C."""
+def running(line, count, words="ready: robot"):
+    """What a line starts, in a ROS domain of its own, once it has said so; it ends by Ctrl-C."""
     domain = claim_domain()
     process = subprocess.Popen(
         line,
@@ -88,7 +88,7 @@ def running(line, nodes):
     )
     output = []
     try:
-        while sum("ready: robot" in said for said in output) < nodes:
+        while sum(words in said for said in output) < count:
             output.append(process.stdout.readline())
             assert output[-1], "".join(output)
         yield domain
@@ -130,6 +130,9 @@ def test_every_console_line_runs_as_it_is_printed(page, sandbox, walking):
         command, *words = line.split()
         if command == "make" and words[0] in HEAVY_TARGETS:
             subprocess.run(f"{line} -n", shell=True, cwd=ROOT, capture_output=True, check=True)
+        elif command == "make" and words[0] == "view":
+            with running(line, 1, "is shown at"):
+                pass
         elif command == "make":
             assert words[0] == "run"
             if words[1:] and line != WALKING:

@@ -23,8 +23,8 @@ INTERFACES = sorted(
 
 # The names under which rosdep knows what is imported under another name.
 ROSDEP_KEYS = {"ruamel": "python3-ruamel.yaml"}
-# What rosdep has no name for, as `requirements.in` names it: bags and design studies need it, the
-# README tells to install it.
+# What rosdep has no name for, as `requirements.in` names it: bags, design studies and the view need
+# it, the README tells to install it.
 FROM_PYPI = {
     "backports": "backports.zstd",
     "distributed": "distributed",
@@ -34,6 +34,7 @@ FROM_PYPI = {
     "pyarrow": "pyarrow",
     "pymoo": "pymoo",
     "rosbags": "rosbags",
+    "viser": "viser",
     "xacro": "xacro",
 }
 

@@ -21,6 +21,7 @@ from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
 from leg_statics.maps import IndexMap
+from leg_statics.view.colours import of_values
 from leg_statics.weight import gravity_of, weight_efforts
 
 BAR_WIDTH = 0.008  # m
@@ -33,16 +34,6 @@ RED = (0.85, 0.2, 0.15, 1.0)
 GREEN = (0.1, 0.6, 0.35, 0.6)
 BLUE = (0.15, 0.4, 0.85, 0.8)
 GREY = (0.5, 0.5, 0.5, 1.0)
-# Viridis at equal steps, from the lowest value to the highest.
-SCALE = np.array(
-    [
-        [0.267, 0.005, 0.329],
-        [0.230, 0.322, 0.546],
-        [0.128, 0.567, 0.551],
-        [0.369, 0.789, 0.383],
-        [0.993, 0.906, 0.144],
-    ]
-)
 
 
 class Scene(NamedTuple):
@@ -104,7 +95,7 @@ def workspace_marker(header: Any, leg: Leg, index_map: IndexMap, layer: str) -> 
         header, workspace_name(leg), Marker.CUBE_LIST, resolution, _points(leg, points), GREY
     )
     marker.scale.z = 0.1 * resolution
-    marker.colors = [ColorRGBA(r=r, g=g, b=b, a=0.7) for r, g, b in colours(values).tolist()]
+    marker.colors = [ColorRGBA(r=r, g=g, b=b, a=0.7) for r, g, b in of_values(values).tolist()]
     return marker
 
 
@@ -125,17 +116,6 @@ def grid_points(index_map: IndexMap) -> FloatArray:
     points[..., 1] = index_map.y[:, None]
     points[..., 2] = index_map.height[..., None, None]
     return points
-
-
-def colours(values: FloatArray) -> FloatArray:
-    """Return a colour (..., 3) for each value: viridis over the finite ones, grey for NaN."""
-    finite = values[np.isfinite(values)]
-    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
-    with np.errstate(invalid="ignore"):
-        share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)
-    steps = np.linspace(0.0, 1.0, len(SCALE))
-    result = np.stack([np.interp(share, steps, column) for column in SCALE.T], axis=-1)
-    return np.where(np.isnan(values)[..., None], GREY[:3], result)
 
 
 def _cone_lines(friction: float) -> FloatArray:

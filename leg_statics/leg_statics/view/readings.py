@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the view says in numbers and words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Reading(NamedTuple):
+    """One line of what is said.
+
+    Attributes:
+        label: What it is.
+        text: The number with its unit, or words.
+    """
+
+    label: str
+    text: str
+
+
+def quantity(value: float, unit: str, digits: int = 1) -> str:
+    """Return a number with its unit; words where it is not finite."""
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "any" if value > 0.0 else "none"
+    return f"{value:.{digits}f} {unit}".rstrip()
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage."""
+    return quantity(100.0 * share, "%")
+
+
+def words(name: str) -> str:
+    """Return a name of a member of an enumeration as words."""
+    return name.lower().replace("_", " ")
+
+
+def table(readings: Iterable[Reading]) -> str:
+    """Return readings as a table of Markdown."""
+    rows = [f"| {label} | {text} |" for label, text in readings]
+    return "\n".join(["| | |", "|---|---|", *rows])
