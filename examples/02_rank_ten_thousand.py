@@ -33,7 +33,8 @@ print(f"{len(candidates)} candidates on wood in {1e3 * duration:.1f} ms")
 print(f"{len(answer.ranking)} carry {LOAD:g} N; the best five:")
 for k in answer.ranking[:5]:
     x, y, z = candidates[k]
-    print(f"  ({x:6.3f}, {y:6.3f}, {z:6.3f}) m carries {answer.load_capacity[k]:5.0f} N")
+    carries, margin = answer.load_capacity[k], answer.margin[k]
+    print(f"  ({x:6.3f}, {y:6.3f}, {z:6.3f}) m carries {carries:5.0f} N, margin {margin:.2f}")
 for reason in REASONS:
     count = np.count_nonzero(answer.verdict == getattr(FootholdVerdict, reason))
     print(f"  {reason.lower().replace('_', ' '):14} {count:5d} candidates")

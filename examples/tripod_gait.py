@@ -482,7 +482,7 @@ class TripodPlanner:
         self, leg: str, positions: FloatArray, under: Any, futures: Mapping[str, Any], state: State
     ) -> Candidates:
         count = len(positions)
-        friction, capacity, mu_e, cost = (np.full(count, np.nan) for _ in range(4))
+        friction, capacity, mu_e, margin = (np.full(count, np.nan) for _ in range(4))
         reason = np.full(count, EDGE, dtype=object)
         for rows, future in futures.values():
             answer = future.wait()
@@ -490,14 +490,14 @@ class TripodPlanner:
             friction[rows] = answer.friction_coefficient
             capacity[rows] = np.min(answer.load_capacity, axis=0)
             mu_e[rows] = np.max(answer.rated_friction, axis=0)
+            margin[rows] = np.min(answer.margin, axis=0)
             reason[rows] = [VERDICTS[int(verdict)] if verdict else "" for verdict in worst]
         reason[(reason == "") & (mu_e > friction)] = SMOOTH
         for foot in state.feet.values():
             near = np.linalg.norm(positions[:, :2] - foot[:2], axis=-1) < self.gait.clearance
             reason[near & (reason == "")] = CROWDED
         distance = np.linalg.norm(positions[:, :2] - positions[count // 2, :2], axis=-1)
-        cost = np.maximum(self.gait.required_load / capacity, mu_e / friction) + distance
-        cost[reason != ""] = np.inf
+        cost = np.where(reason == "", distance - margin, np.inf)
         return Candidates(leg, positions, under, friction, capacity, mu_e, cost, reason)
 
     def choose(

@@ -19,8 +19,18 @@ def today(tmp_path_factory):
         return observe(client, robot)
 
 
+# Loads are vertical now, where they were along the normal of the witness's slope, candidates are
+# ranked by margin, and legs without rated friction have no steps by it: that has no witness. A line
+# on which no point is feasible tells what is wrong at its front, too, where it told its rear twice.
+MEANS_ELSE = re.compile(
+    r"/query_footholds/(verdict|limiting_joint|load_capacity|utilisation|joint_efforts|forces"
+    r"|ranking)\b|/query_step_length/\dcapacity/|/query_step_length/(\dfriction/load_capacity|0friction/limits)\b"
+    r"|_index_map/(\w+/)?load_capacity\b|^walker\w*/.*/query_step_length/"
+)
+
+
 def test_every_answer_equals_that_in_the_former_axes(today):
-    former = read(WITNESS)
+    former = {name: values for name, values in read(WITNESS).items() if not MEANS_ELSE.search(name)}
     assert len(former) > 1000
     assert former.keys() <= today.keys()  # what is new, such as an index, has no witness
     wrong = [name for name in former if not _same(name, today[name], former[name])]

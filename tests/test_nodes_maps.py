@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from leg_msgs.msg import ErrorCode
+from leg_msgs.msg import EffortLimits, ErrorCode
 from leg_msgs.msg import Ground as GroundMessage
 from leg_msgs.srv import GetIndexMap
 from leg_msgs_py import errors
@@ -94,8 +94,15 @@ def test_layers_come_in_the_order_asked_for(suite):
     assert answer.units == ("N", "1")
 
 
+def test_without_a_ground_a_map_has_all_but_load_capacity(suite, hexapod):
+    answer = suite.client.index_map(LEG, -0.65, 0.1)
+    assert (*answer.layers, "load_capacity") == supported_layers(hexapod.legs[LEG].mechanism)
+    with pytest.raises(errors.InvalidInputError, match="ground: neither name nor friction"):
+        suite.client.index_map(LEG, -0.65, 0.1, ["load_capacity"])
+
+
 def test_a_plane_beyond_reach_is_empty(suite):
-    answer = suite.client.index_map(LEG, 5.0, COARSE)
+    answer = suite.client.index_map(LEG, -5.0, COARSE)
     assert np.isnan(answer.values).all()
     assert (answer.status != Status.OK).all()
 
@@ -204,6 +211,26 @@ def gated(gated_node):
     for work in gated_node.orders:
         work.cancel()
     gated_node.let(0)
+
+
+def test_maps_tell_if_no_node_tells_them_the_limits_in_force(gated_node, suite):
+    """As when the statics node has another name."""
+    node, said = suite.client.node, {}
+
+    def hear(message):
+        said[message.status[0].name] = message.status[0].message
+
+    heard = node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+    elsewhere = node.create_publisher(EffortLimits, "/gated/leg_load/effort_limits", LATCHED)
+    try:
+        wait_for(lambda: "/gated/leg_load/effort_limits" in said.get("/gated/maps: health", ""))
+        assert "no node publishes /gated/statics/effort_limits" in said["/gated/maps: health"]
+        told = node.create_publisher(EffortLimits, "/gated/statics/effort_limits", LATCHED)
+        wait_for(lambda: said["/gated/maps: health"] == "ok")
+        node.destroy_publisher(told)
+    finally:
+        node.destroy_publisher(elsewhere)
+        node.destroy_subscription(heard)
 
 
 def planes_of(hexapod, resolution):
@@ -315,12 +342,12 @@ BAD = {
     "leg": ({"leg": "tail"}, "UNKNOWN_LEG", ["tail", LEG]),
     "ground": ({"ground": GroundMessage(name="lava")}, "UNKNOWN_GROUND", ["lava", "cement"]),
     "mu < 0": (
-        {"ground": GroundMessage(friction_coefficient=-1.0)},
+        {"ground": GroundMessage(friction_coefficient=-0.1)},
         "INVALID_INPUT",
-        ["ground.friction_coefficient", "-1.0"],
+        ["ground.friction_coefficient", "-0.1"],
     ),
     "normal": (
-        {"ground": GroundMessage(normal=[math.nan, 0.0, 1.0])},
+        {"ground": GroundMessage(name="ice", normal=[math.nan, 0.0, 1.0])},
         "INVALID_INPUT",
         ["ground.normal", "nan"],
     ),
@@ -364,7 +391,9 @@ def test_a_goal_in_an_unknown_frame_is_ended_with_the_reason(suite):
         suite.client.compute_index_map(LEG, 0.1, frame="map")
 
 
-def test_a_height_that_is_not_finite_is_refused(suite):
+def test_a_height_that_is_not_finite_or_above_the_foot_is_refused(suite):
+    with pytest.raises(errors.InvalidInputError, match="height must be negative below"):
+        suite.client.index_map(LEG, 0.65, 0.1)
     with pytest.raises(errors.InvalidInputError, match="height"):
         suite.client.index_map(LEG, math.nan, 0.1)
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a gait planner asks: footholds and steps, equal to the library's, and clear refusals."""
 
-import array
 import math
 
 import numpy as np
@@ -14,7 +13,7 @@ from leg_msgs_py.client import LegClient
 from leg_msgs_py.grounds import Ground
 from nodes_support import MAX_POINTS, ask, set_parameter
 
-from leg_statics.footholds import Contact, Verdict, evaluate_footholds
+from leg_statics.footholds import Contact, Verdict, evaluate_around, evaluate_footholds
 from leg_statics.step_length import Criterion, common_step, longest_step
 
 LEG = "left_front"
@@ -37,7 +36,9 @@ def assert_same_footholds(answer, wanted):
     np.testing.assert_array_equal(answer.ranking, wanted.ranking)
     for name in ("load_capacity", "rated_friction", "rated_friction_full", "friction_margin"):
         np.testing.assert_allclose(getattr(answer, name), getattr(wanted, name), **SAME)
-    np.testing.assert_allclose(answer.utilisation, wanted.utilisation, **SAME)
+    for name in ("utilisation", "clearance", "margin"):
+        np.testing.assert_allclose(getattr(answer, name), getattr(wanted, name), **SAME)
+    np.testing.assert_array_equal(answer.ranking_by_capacity, wanted.ranking_by_capacity)
 
 
 # --------------------------------------------------------------------------- footholds
@@ -77,6 +78,14 @@ def test_footholds_equal_the_library(suite, hexapod, case):
     assert answer.joint_names == leg.joint_names
     assert answer.best == answer.ranking[0]
     np.testing.assert_array_equal(answer.feasible, wanted.feasible)
+
+
+def test_footholds_that_the_foot_may_miss_equal_the_library(suite, hexapod):
+    leg = hexapod.legs[LEG]
+    feet = candidates(leg, (60,))  # each stands for 13 points
+    wanted = evaluate_around(leg, feet, Contact(0.4, load=300.0), 0.01)
+    answer = suite.client.query_footholds(LEG, feet, "cement", 300.0, radius=0.01)
+    assert_same_footholds(answer, wanted)
 
 
 def test_the_cases_meet_every_verdict(suite, hexapod):
@@ -262,6 +271,22 @@ BAD_FOOTHOLDS = {
         "INVALID_INPUT",
         ["ground.normal", "nan", "finite"],
     ),
+    "no ground": (
+        {"ground": GroundMessage()},
+        "INVALID_INPUT",
+        ["ground", "neither name nor friction_coefficient", "cement", ">= 0"],
+    ),
+    "normal into the ground": (
+        {"ground": GroundMessage(name="ice", normal=[0.1, 0.0, -1.0])},
+        "INVALID_INPUT",
+        ["normal", "out of the ground", "0.1", "-1.0"],
+    ),
+    "negative radius": ({"radius": -0.01}, "INVALID_INPUT", ["radius", "-0.01", ">= 0"]),
+    "too large with all that is around": (
+        {"positions": P * (MAX_POINTS // 12), "radius": 0.01},
+        "TOO_LARGE",
+        ["positions", str(MAX_POINTS), "max_points"],
+    ),
     "negative load": ({"required_load": -1.0}, "INVALID_INPUT", ["required_load", "-1.0", ">= 0"]),
     "NaN load": ({"required_load": math.nan}, "INVALID_INPUT", ["required_load", "nan"]),
     "infinite load": ({"required_load": math.inf}, "INVALID_INPUT", ["required_load", "inf"]),
@@ -295,6 +320,12 @@ BAD_STEPS = {
     "leg twice": ({"legs": [LEG, LEG]}, "INVALID_INPUT", ["legs", LEG, "twice"]),
     "ground": ({"ground": GroundMessage(name="lava")}, "UNKNOWN_GROUND", ["lava", "cement"]),
     "height": ({"heights": [-0.6, math.nan]}, "INVALID_INPUT", ["heights", "nan", "finite"]),
+    "height above what a foot reaches": (
+        {"heights": [0.65]},
+        "INVALID_INPUT",
+        ["height", "negative below", "0.65"],
+    ),
+    "no ground": ({"ground": GroundMessage()}, "INVALID_INPUT", ["ground", "cement"]),
     "frame of one leg for several": (
         {"legs": [LEG, "right_rear"], "frame": "left_front_leg"},
         "INVALID_INPUT",
@@ -319,8 +350,16 @@ BAD_STEPS = {
 }
 
 GOOD = {
-    "query_footholds": (QueryFootholds, {"leg": LEG, "positions": P}, BAD_FOOTHOLDS),
-    "query_step_length": (QueryStepLength, {"legs": [LEG], "heights": [-0.65]}, BAD_STEPS),
+    "query_footholds": (
+        QueryFootholds,
+        {"leg": LEG, "positions": P, "ground": CEMENT},
+        BAD_FOOTHOLDS,
+    ),
+    "query_step_length": (
+        QueryStepLength,
+        {"legs": [LEG], "heights": [-0.65], "ground": CEMENT},
+        BAD_STEPS,
+    ),
 }
 BAD = {
     f"{service}: {name}": (service, service_type, good, *case)
@@ -362,11 +401,10 @@ def test_the_limit_of_the_node_is_a_parameter(suite):
         assert set_parameter(suite.client.node, "statics", "max_points", MAX_POINTS).successful
 
 
-def test_a_request_that_is_left_as_it_is_stands_on_a_ground_without_friction(suite):
-    request = QueryFootholds.Request(leg=LEG, positions=array.array("d", P))
-    answer = ask(suite.client, "query_footholds", request)
+def test_a_smooth_ground_is_a_ground(suite):
+    answer = suite.client.query_footholds(LEG, P, 0.0)
     assert answer.friction_coefficient == 0.0
-    assert answer.load_capacity == suite.client.query_footholds(LEG, P, 0.0).load_capacity
+    assert answer.load_capacity > 0.0
 
 
 @pytest.mark.parametrize(

@@ -201,9 +201,8 @@ def test_the_summary_says_what_the_planner_was_answered(recorded):
             Verdict(k): n
             for k, n in zip(*np.unique(wanted.verdict, return_counts=True), strict=True)
         }
-        np.testing.assert_equal(
-            answer.best, np.max(wanted.load_capacity[wanted.ranking], initial=0.0) or np.nan
-        )
+        best = wanted.load_capacity[wanted.best] if len(wanted.ranking) else np.nan
+        np.testing.assert_equal(answer.best, best)
     assert hundreds[0] == hundreds[2] != hundreds[1]  # the limits in force count
     step, _ = (q.answer for q in by_service["query_step_length"] if q.legs != "right_front")
     assert (step.points, step.best) == (12, np.max(steps.common_length))
@@ -316,7 +315,7 @@ def test_events_are_recorded_as_rosbag2_does(recorded):
     bag = Bag(recorded[0])
     topic = bag.topics[FOOTHOLDS]
     assert topic.type == EVENT
-    assert topic.definition.data.startswith(f"{'=' * 80}\nSRV: leg_msgs/srv/QueryFootholds\n# Can")
+    assert topic.definition.data.startswith(f"{'=' * 80}\nSRV: leg_msgs/srv/QueryFootholds\n# What")
     digest = message_definition(EVENT).hash
     assert bag.types.hash_rihs01(EVENT) == digest
     assert digest in (recorded[0] / "metadata.yaml").read_text()

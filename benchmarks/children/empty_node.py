@@ -53,7 +53,7 @@ def ready_footholds() -> Any:
     """Return an answer for one foothold."""
     numbers = ("load_capacity", "rated_friction", "rated_friction_full", "friction_margin")
     return QueryFootholds.Response(
-        **{name: to_field(np.ones(1)) for name in (*numbers, "utilisation")},
+        **{name: to_field(np.ones(1)) for name in (*numbers, "utilisation", "clearance", "margin")},
         **{name: to_field(np.zeros(1), np.uint8) for name in ("verdict", "status")},
         **{name: to_field(np.zeros(1), np.int32) for name in ("limiting_joint", "ranking")},
     )

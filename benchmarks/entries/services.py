@@ -33,6 +33,8 @@ FOOTHOLD_FIELDS = {  # of the response, with the type of their numbers
     "rated_friction_full": np.float64,
     "friction_margin": np.float64,
     "utilisation": np.float64,
+    "clearance": np.float64,
+    "margin": np.float64,
     "limiting_joint": np.int32,
     "ranking": np.int32,
 }

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,12 @@ class Mount:
 
     position: FloatArray
     rotation: FloatArray
+
+    @cached_property
+    def vertical(self) -> tuple[float, float, float]:
+        """The z axis of the base frame in the leg frame, which counts as vertical."""
+        x, y, z = self.rotation[2].tolist()
+        return x, y, z
 
     def to_base(self, points: ArrayLike) -> FloatArray:
         """Turn points (..., 3) of the leg frame into the base frame [m]."""

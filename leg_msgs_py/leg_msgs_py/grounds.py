@@ -16,7 +16,8 @@ class Ground(NamedTuple):
 
     Attributes:
         friction: Name of a ground that the nodes know, such as "cement", or a friction coefficient.
-        normal: Normal of the ground in the frame of the request (3,), of any length; None = level.
+        normal: Normal of the ground in the frame of the request (3,), out of it and upwards, of any
+            length; None = level, the z axis of the robot's base frame.
         high_end: Whether a named ground's friction is the high end of its range, not the low one.
     """
 
@@ -45,6 +46,8 @@ class Ground(NamedTuple):
         return message
 
 
-def ground_message(ground: Ground | str | float) -> Any:
-    """Return a ground, its name or its friction coefficient as a `leg_msgs/Ground`."""
+def ground_message(ground: Ground | str | float | None) -> Any:
+    """Return a ground, its name, its friction coefficient or None as a `leg_msgs/Ground`."""
+    if ground is None:
+        return GroundMessage()
     return (ground if isinstance(ground, Ground) else Ground(ground)).to_message()

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from leg_kinematics.arrays import (
     common_batch,
 )
 from leg_kinematics.errors import ValueRangeError
+from leg_kinematics.robot import Leg
 from leg_statics.capacity.problem import (
     ANY_MOMENT,
     LOAD,
@@ -25,8 +27,11 @@ from leg_statics.capacity.problem import (
     MU,
     NORMAL,
     OF_CONTACT,
+    VERTICAL,
+    check_directions,
     check_normals,
 )
+from leg_statics.weight import level_gravity
 
 
 class Contact(NamedTuple):
@@ -36,58 +41,90 @@ class Contact(NamedTuple):
     if it is used again.
 
     Attributes:
-        friction: Friction coefficient mu of the ground (...,), 0 to infinity.
-        normal: Normal of the ground in the leg frame (..., 3), of any length.
-        load: Required normal load (...,) [N].
+        friction: Friction coefficient mu of the ground (...,), 0 to infinity; on a slope, infinity
+            stands for 1e8.
+        normal: Normal of the ground in the leg frame, out of it and upwards, of any length
+            (..., 3); None = level.
+        load: Required vertical component of the ground's force (...,) [N].
         moment: Moment that the ground applies to the foot (..., 3) [N.m]; zero on hard ground.
         any_direction_moment: Magnitude of a horizontal moment of unknown direction that must be
             borne on top (...,) [N.m]: the worst case over directions, equation (27).
         bias_efforts: Efforts that the actuators exert anyway (..., n) or one for all, on top of
             those that hold the leg's own weight if its masses are known [N.m or N].
-        gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²]; None for that of a level
-            body.
+        gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²], against which loads
+            count; None = that of a level body.
     """
 
     friction: ArrayLike
-    normal: ArrayLike = (0.0, 0.0, 1.0)
+    normal: ArrayLike | None = None
     load: ArrayLike = 0.0
     moment: ArrayLike = (0.0, 0.0, 0.0)
     any_direction_moment: ArrayLike = 0.0
     bias_efforts: ArrayLike = 0.0
     gravity: ArrayLike | None = None
 
+    def under(self, gravity: ArrayLike) -> Contact:
+        """Return the same with the directions that are not given, under a given gravity."""
+        gravity = as_array("gravity", gravity if self.gravity is None else self.gravity, 3)
+        normal = np.negative(gravity) if self.normal is None else self.normal
+        return self._replace(normal=normal, gravity=gravity)
 
-def contact_rows(contact: Contact, n: int) -> FloatArray:
-    """Return all that a contact says of a point in one row (..., 9 + n)."""
+    def spread(self) -> Contact:
+        """Return the same for several points of each candidate, along a last axis (..., m)."""
+        return self._replace(
+            friction=np.expand_dims(self.friction, -1),
+            normal=None if self.normal is None else np.expand_dims(self.normal, -2),
+            load=np.expand_dims(self.load, -1),
+            moment=np.expand_dims(self.moment, -2),
+            any_direction_moment=np.expand_dims(self.any_direction_moment, -1),
+            bias_efforts=np.expand_dims(self.bias_efforts, -2)
+            if np.ndim(self.bias_efforts)
+            else self.bias_efforts,
+            gravity=None if self.gravity is None else np.expand_dims(self.gravity, -2),
+        )
+
+    def turned(self, turn: Callable[[ArrayLike], FloatArray]) -> Contact:
+        """Return the same in another frame, into which `turn` takes vectors (..., 3)."""
+        return self._replace(
+            normal=None if self.normal is None else turn(self.normal),
+            moment=turn(self.moment),
+            gravity=None if self.gravity is None else turn(self.gravity),
+        )
+
+
+def contact_rows(contact: Contact, leg: Leg) -> FloatArray:
+    """Return all that a contact says of a point in one row (..., 12 + n)."""
+    gravity, n = level_gravity(leg), len(leg.effort_limits)
     try:
-        return _known_row(contact, n)
+        return _known_row(contact, gravity, n)
     except TypeError:  # arrays have no hash
-        return _joined(_arrays(contact, n), n)
+        return _joined(_arrays(contact, gravity, n), n)
 
 
 @lru_cache
-def _known_row(contact: Contact, n: int) -> FloatArray:
+def _known_row(contact: Contact, gravity: tuple[float, ...], n: int) -> FloatArray:
     """Return the row of a contact that cannot change, kept for the next call."""
-    return _joined(_arrays(contact, n), n)
+    return _joined(_arrays(contact, gravity, n), n)
 
 
-def _arrays(contact: Contact, n: int) -> Contact:
-    """Return a contact whose fields are arrays."""
+def _arrays(contact: Contact, gravity: ArrayLike, n: int) -> Contact:
+    """Return a contact with all directions whose fields are arrays."""
     require("contact", contact, Contact)
+    contact = contact.under(gravity)
     return Contact(
         as_array("friction", contact.friction),
-        as_array("normal", contact.normal, 3),
+        as_array("normal", cast(ArrayLike, contact.normal), 3),
         as_array("load", contact.load),
         as_array("moment", contact.moment, 3),
         as_array("any_direction_moment", contact.any_direction_moment),
         as_vectors("bias_efforts", contact.bias_efforts, n),
-        as_array("gravity", 0.0 if contact.gravity is None else contact.gravity),
+        as_array("gravity", cast(ArrayLike, contact.gravity), 3),
     )
 
 
-def leading_shapes(contact: Contact, n: int) -> dict[str, tuple[int, ...]]:
+def leading_shapes(contact: Contact, leg: Leg) -> dict[str, tuple[int, ...]]:
     """Return the leading axes of the fields of a contact, by name."""
-    return _leading_shapes(_arrays(contact, n))
+    return _leading_shapes(_arrays(contact, level_gravity(leg), len(leg.effort_limits)))
 
 
 def _leading_shapes(contact: Any) -> dict[str, tuple[int, ...]]:
@@ -99,6 +136,7 @@ def _leading_shapes(contact: Any) -> dict[str, tuple[int, ...]]:
         "moment": contact.moment.shape[:-1],
         "any_direction_moment": contact.any_direction_moment.shape,
         "bias_efforts": contact.bias_efforts.shape[:-1],
+        "gravity": contact.gravity.shape[:-1],
     }
 
 
@@ -107,7 +145,8 @@ def _joined(contact: Contact, n: int) -> FloatArray:
     batch = common_batch(_leading_shapes(contact).values())
     row = np.empty((OF_CONTACT + n, *batch[::-1])).T  # each field in one piece of memory
     row[..., MU] = contact.friction
-    row[..., NORMAL:LOAD] = contact.normal
+    row[..., NORMAL:VERTICAL] = contact.normal
+    row[..., VERTICAL:LOAD] = -cast(FloatArray, contact.gravity)
     row[..., LOAD] = contact.load
     row[..., MOMENT:ANY_MOMENT] = contact.moment
     row[..., ANY_MOMENT] = contact.any_direction_moment
@@ -115,10 +154,12 @@ def _joined(contact: Contact, n: int) -> FloatArray:
     return row
 
 
-def check_contact(contact: Contact, n: int) -> None:
+def check_contact(contact: Contact, leg: Leg) -> None:
     """Raise a ValueRangeError for a value that is out of range."""
-    contact = _arrays(contact, n)
-    check_normals("normal", np.asarray(contact.normal))
+    contact = _arrays(contact, level_gravity(leg), len(leg.effort_limits))
+    gravity = np.asarray(contact.gravity)
+    check_directions("gravity", gravity)
+    check_normals(np.asarray(contact.normal), -gravity)
     for name in ("friction", "load", "any_direction_moment"):
         as_non_negative(name, getattr(contact, name))
     for name in ("load", "moment", "any_direction_moment", "bias_efforts", "gravity"):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.errors import ShapeError
 from leg_kinematics.kernels.kernel import inlined, kernel, scalar
+from leg_kinematics.kernels.vectors import cross
 
 
 def joint_efforts(
@@ -108,15 +109,22 @@ def _utilisation(efforts, limits, worst, joint):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def worst_moment_effort(x: float, y: float) -> float:
-    """Return the effort of a joint with (x, y, z) in J_omega: equation (27)."""
-    return math.sqrt(x * x + y * y)
+def worst_moment_effort(column, vertical):  # type: ignore[no-untyped-def]
+    """Return the largest effort of a joint for a unit moment that is horizontal: equation (27).
+
+    Args:
+        column: The joint's column of J_omega.
+        vertical: Unit vector to which the moment is perpendicular.
+    """
+    x, y, z = cross(vertical, column)
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel("(d,n)->(n)", "f8[:,:], f8[:]")
-def _worst_moment_efforts(angular, efforts):
+def _worst_moment_efforts(angular, efforts):  # type: ignore[no-untyped-def]
     for k in range(efforts.shape[0]):
-        efforts[k] = worst_moment_effort(angular[0, k], angular[1, k])
+        column = angular[0, k], angular[1, k], angular[2, k]
+        efforts[k] = worst_moment_effort(column, (0.0, 0.0, 1.0))
 
 
 def worst_moment_efforts(angular_jacobian: FloatArray) -> FloatArray:

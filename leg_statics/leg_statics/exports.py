@@ -4,7 +4,7 @@
 from leg_statics.capacity.problem import CapacityStatus, LoadCapacity, load_capacity
 from leg_statics.contact import Contact
 from leg_statics.efforts import joint_efforts, utilisation
-from leg_statics.footholds import Footholds, Verdict, evaluate_footholds
+from leg_statics.footholds import Footholds, Verdict, evaluate_around, evaluate_footholds
 from leg_statics.grounds import Ground, Grounds, load_grounds
 from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStream
@@ -52,6 +52,7 @@ __all__ = [
     "Verdict",
     "best_forces",
     "common_step",
+    "evaluate_around",
     "evaluate_footholds",
     "evaluate_indices",
     "evaluate_stances",

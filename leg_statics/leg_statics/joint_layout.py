@@ -13,7 +13,7 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import without_reflection
 from leg_kinematics.robot import Drives, Leg, Robot
-from leg_statics.weight import gravity_of
+from leg_statics.weight import level_gravity
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,15 @@ def joint_layout(robot: Robot, names: Sequence[str]) -> JointLayout:
 
 def _leg_group(mechanism: Mechanism, legs: Sequence[Leg], column: dict[str, int]) -> LegGroup:
     limits = np.array([leg.effort_limits for leg in legs])
+    signs = np.array([without_reflection(leg.mechanism)[1] for leg in legs])
     return LegGroup(
         mechanism=mechanism,
         legs=tuple(leg.name for leg in legs),
         columns=np.array([[column[joint] for joint in leg.joint_names] for leg in legs]),
-        signs=np.array([without_reflection(leg.mechanism)[1] for leg in legs]),
+        signs=signs,
         lower=np.ascontiguousarray(limits[..., 0]),
         upper=np.ascontiguousarray(limits[..., 1]),
-        gravity=np.array([gravity_of(leg) * without_reflection(leg.mechanism)[1] for leg in legs]),
+        gravity=signs * [level_gravity(leg) for leg in legs],
         drives=_common_drives(legs),
     )
 

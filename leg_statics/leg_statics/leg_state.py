@@ -35,8 +35,9 @@ class LegStates(NamedTuple):
         foot_velocity: Their velocities (..., L, 3) [m/s]; NaN if the joints' are not known.
         condition_number: Condition number of the Jacobian (..., L); NaN where status is not OK, or
             if the Jacobian is not square.
-        load_capacity: Greatest vertical ground reaction (..., L) [N], the legs' own weight borne on
-            a level body if their masses are known; NaN where status is not OK.
+        load_capacity: Greatest vertical ground reaction, along z of the base frame, on level ground
+            (..., L) [N], the legs' own weight borne if their masses are known; NaN where status is
+            not OK.
         rated_friction: mu_e = |F_x / F_z|, forward over vertical (..., L); NaN as the condition
             number.
         rated_friction_full: sqrt(F_x² + F_y²) / F_z of the same force (..., L).
@@ -74,7 +75,15 @@ def leg_states(
     posture, twist = group.mechanism.forward_with_twist(joint_positions)
     jacobian = twist[..., :3, :]
     weight = weight_efforts(group.mechanism, posture, group.gravity)
-    borne = load_capacity(jacobian, group.lower, group.upper, friction, bias_efforts=weight)
+    borne = load_capacity(
+        jacobian,
+        group.lower,
+        group.upper,
+        friction,
+        normal=-group.gravity,
+        vertical=-group.gravity,
+        bias_efforts=weight,
+    )
     velocity, condition, mu_e, mu_full, used = _leg_states(
         jacobian, posture.status, group.lower, group.upper, joint_velocities, joint_efforts
     )

@@ -8,15 +8,17 @@ import time
 from collections import OrderedDict
 from collections.abc import Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray
+from leg_kinematics.arrays import FloatArray, as_array
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_statics.footholds import Contact
 from leg_statics.maps import IndexMap, best_points, find_layer, plane_map, volume_map
+from leg_statics.weight import level_gravity
 
 
 class MapKey(NamedTuple):
@@ -28,8 +30,8 @@ class MapKey(NamedTuple):
         resolution: Grid spacing [m].
         layers: Names of the layers; none for all.
         effort_limits: Lower and upper effort of each actuator, flat [N.m or N].
-        friction: Friction coefficient of the ground.
-        normal: Normal of the ground in the leg frame.
+        ground: Friction coefficient of the ground, its normal and gravity in the leg frame; None
+            without a ground.
     """
 
     mechanism: Mechanism
@@ -37,8 +39,7 @@ class MapKey(NamedTuple):
     resolution: float
     layers: tuple[str, ...]
     effort_limits: tuple[float, ...]
-    friction: float
-    normal: tuple[float, ...]
+    ground: tuple[float, tuple[float, ...], tuple[float, ...]] | None
 
     @classmethod
     def of(
@@ -47,13 +48,15 @@ class MapKey(NamedTuple):
         height: float | None,
         resolution: float,
         layers: tuple[str, ...],
-        contact: Contact,
+        contact: Contact | None,
     ) -> MapKey:
         """Return the key of a map; see the attributes for the arguments."""
-        limits = tuple(map(float, np.ravel(leg.effort_limits)))
-        normal = tuple(map(float, np.ravel(contact.normal)))
-        friction = float(np.asarray(contact.friction))
-        return cls(leg.mechanism, height, resolution, layers, limits, friction, normal)
+        limits = _floats(leg.effort_limits)
+        if contact is None:
+            return cls(leg.mechanism, height, resolution, layers, limits, None)
+        given = contact.under(level_gravity(leg))
+        ground = float(np.asarray(given.friction)), _floats(given.normal), _floats(given.gravity)
+        return cls(leg.mechanism, height, resolution, layers, limits, ground)
 
     @property
     def leg(self) -> Leg:
@@ -61,9 +64,12 @@ class MapKey(NamedTuple):
         return Leg.of(self.mechanism, np.reshape(self.effort_limits, (-1, 2)))
 
     @property
-    def contact(self) -> Contact:
-        """The ground, without a load."""
-        return Contact(self.friction, self.normal)
+    def contact(self) -> Contact | None:
+        """The ground, without a load; None if there is none."""
+        if self.ground is None:
+            return None
+        friction, normal, gravity = self.ground
+        return Contact(friction, normal, gravity=gravity)
 
 
 class MapMemory:
@@ -113,6 +119,11 @@ class MapMemory:
             )
             self.keep(key, found)
         return found
+
+
+def _floats(values: ArrayLike | None) -> tuple[float, ...]:
+    """Return the numbers of an array, for a key."""
+    return tuple(as_array("values", cast(ArrayLike, values)).ravel().tolist())
 
 
 def _size(index_map: IndexMap) -> int:

@@ -18,7 +18,7 @@ from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, judge_footholds
 from leg_statics.indices import find_index, indices_of, supported_indices
 from leg_statics.kinematics import Kinematics
-from leg_statics.workspace import workspace_bounds
+from leg_statics.workspace import check_heights, workspace_bounds
 
 CAPACITY_LAYER = "load_capacity"
 MOST_POINTS = 20_000_000
@@ -141,10 +141,12 @@ def plane_map(
 
     Raises:
         UnknownNameError: If a layer does not exist.
-        ValueRangeError: If height or resolution are out of range, or the map would be too large.
+        ValueRangeError: If height or resolution are out of range, the height is positive and above
+            all that the foot reaches, or the map would be too large.
     """
     height = as_number("height", height)
     names = _layers(leg, layers, contact)
+    check_heights(leg.mechanism, height)
     x, y = _axes(leg.mechanism, resolution, 2)
     values, status = _slice(leg, x, y, height, names, contact)
     return IndexMap(x, y, np.array(height), names, values, status)

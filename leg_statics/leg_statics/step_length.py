@@ -17,18 +17,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, StatusArray, as_array
-from leg_kinematics.errors import ValueRangeError
+from leg_kinematics.errors import NotSupportedError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 from leg_statics.footholds import Contact, Footholds, Verdict, evaluate_footholds
-from leg_statics.workspace import actuator_grid
+from leg_statics.workspace import actuator_grid, check_heights
 
 END_TOLERANCE = 1e-6  # m, to which the ends of a stance are found
 SAMPLING = 2e-3  # m, a feasible stretch shorter than this may be overlooked
+PARTS = 8  # of a sampling distance; a gap in a stance that is shorter than one may be overlooked
 PROFILE_POINTS = 21
 FORWARD = (1.0, 0.0, 0.0)  # of a leg and of the body: both frames follow REP-103
 LONGEST_LINE = 20_000  # samples of one line
+LINES_AT_ONCE = 32
 
 
 class Criterion(IntEnum):
@@ -82,6 +84,8 @@ def longest_step(
 
     The line runs along `direction` at the given height; it passes the origin of the leg frame at
     the lateral offset, which counts to the left of the direction (y for the default direction).
+    It is sampled every 2 mm, and what seems feasible every 0.25 mm: a shorter feasible stretch, or
+    a shorter gap in one, may be overlooked.
 
     Args:
         leg: The leg; its foot must be a point in space.
@@ -95,57 +99,109 @@ def longest_step(
         The step for each height, its ends to 0.1 mm and better, and what limits them.
 
     Raises:
-        ValueRangeError: If heights or offsets are not finite, or the direction is not horizontal.
+        NotSupportedError: If the end is no point foot, or the leg has no rated friction and that
+            is the criterion.
+        ValueRangeError: If heights or offsets are not finite, a height is positive and above all
+            that the foot reaches, or the direction is not horizontal.
         ShapeError: If shapes do not fit.
     """
     require("leg", leg, Leg)
-    require("criterion", criterion, Criterion)
     along = _horizontal_unit(direction)
+    axes = np.stack([along, _left_of(along), np.array([0.0, 0.0, 1.0])])
+    return _longest_stance(leg, axes, height, lateral_offset, contact, criterion)
+
+
+def _longest_stance(
+    leg: Leg,
+    axes: FloatArray,
+    height: ArrayLike,
+    lateral_offset: ArrayLike,
+    contact: Contact,
+    criterion: Criterion,
+) -> StepLength:
+    """Find the longest stance along the first of three axes (3, 3), whose third is upwards."""
+    along, left, up = axes
     heights, offsets = np.broadcast_arrays(
         _finite("height", height), _finite("lateral_offset", lateral_offset)
     )
-    left = np.array([-along[1], along[0], 0.0])
-    origin = offsets[..., None] * left + heights[..., None] * np.array([0.0, 0.0, 1.0])
+    check_heights(leg.mechanism, heights, up)
+    _check_criterion(leg.mechanism, criterion)
+    batch = heights.shape
+    origins = offsets.reshape(-1, 1) * left + heights.reshape(-1, 1) * up
+    lines, reach = np.arange(len(origins)), _reach(leg.mechanism)
 
-    def evaluate(s: FloatArray) -> tuple[NDArray[np.uint8], Footholds]:
-        """Return verdict and footholds at distances s (..., m) along the lines."""
-        points = origin[..., None, :] + s[..., None] * along
-        footholds = evaluate_footholds(leg, points, contact)
+    def evaluate(line: NDArray[np.intp], s: FloatArray) -> tuple[StatusArray, Footholds]:
+        """Return verdict and footholds at distances s along lines."""
+        footholds = evaluate_footholds(leg, origins[line] + s[..., None] * along, contact)
         return _verdicts(footholds, contact, criterion), footholds
 
-    reach = _reach(leg.mechanism)
-    samples = int(min(2.0 * reach / SAMPLING, LONGEST_LINE)) + 1
-    s = np.linspace(-reach, reach, samples)
-    feasible = evaluate(np.broadcast_to(s, (*heights.shape, samples)))[0] == Verdict.FEASIBLE
-    rear, front = _longest_run(feasible)
-    found = rear >= 0
+    def is_feasible(line: NDArray[np.intp], s: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray(evaluate(line, s)[0] == Verdict.FEASIBLE)
 
-    def refined(inside: NDArray[np.int64], outward: int) -> tuple[FloatArray, StatusArray]:
-        """Bisect between a feasible sample and its infeasible neighbour."""
-        good = s[np.where(found, inside, 0)]
-        bad = s[np.clip(np.where(found, inside, 0) + outward, 0, samples - 1)]
-        while np.max(np.abs(bad - good), initial=0.0) > END_TOLERANCE:
-            middle = 0.5 * (good + bad)
-            ok = evaluate(middle[..., None])[0][..., 0] == Verdict.FEASIBLE
-            good, bad = np.where(ok, middle, good), np.where(ok, bad, middle)
-        return np.where(found, good, np.nan), evaluate(bad[..., None])[0][..., 0]
-
-    start, start_limit = refined(rear, -1)
-    end, end_limit = refined(front, 1)
+    brackets: list[FloatArray] = [np.empty((2, 2, 0))]
+    for first in range(0, len(lines), LINES_AT_ONCE):
+        brackets.append(_brackets(is_feasible, lines[first : first + LINES_AT_ONCE], reach))
+    good, bad = np.concatenate(brackets, axis=-1)
+    while np.nanmax(np.abs(bad - good), initial=0.0) > END_TOLERANCE:
+        middle = 0.5 * (good + bad)
+        ok = is_feasible(lines, middle)
+        good = np.where(ok, middle, good)
+        bad = np.where(ok | np.isnan(middle), bad, middle)
+    limits, _ = evaluate(lines, bad)
+    start, end = good
     share = np.linspace(0.0, 1.0, PROFILE_POINTS)
-    profile = start[..., None] + (end - start)[..., None] * share
-    _, footholds = evaluate(profile)
+    _, footholds = evaluate(lines[:, None], start[:, None] + (end - start)[:, None] * share)
     return StepLength(
-        length=np.where(found, end - start, 0.0),
-        start=origin + start[..., None] * along,
-        end=origin + end[..., None] * along,
-        start_limit=start_limit,
-        end_limit=end_limit,
-        positions=footholds.posture.foot_position,
-        load_capacity=footholds.load_capacity,
-        rated_friction=footholds.rated_friction,
-        rated_friction_full=footholds.rated_friction_full,
+        length=np.nan_to_num(end - start).reshape(batch),
+        start=(origins + start[:, None] * along).reshape(*batch, 3),
+        end=(origins + end[:, None] * along).reshape(*batch, 3),
+        start_limit=limits[0].reshape(batch),
+        end_limit=limits[1].reshape(batch),
+        positions=footholds.posture.foot_position.reshape(*batch, PROFILE_POINTS, 3),
+        load_capacity=footholds.load_capacity.reshape(*batch, PROFILE_POINTS),
+        rated_friction=footholds.rated_friction.reshape(*batch, PROFILE_POINTS),
+        rated_friction_full=footholds.rated_friction_full.reshape(*batch, PROFILE_POINTS),
     )
+
+
+def _brackets(
+    is_feasible: Callable[[NDArray[np.intp], FloatArray], NDArray[np.bool_]],
+    lines: NDArray[np.intp],
+    reach: float,
+) -> FloatArray:
+    """Return a feasible point of each end of the longest stance, and one beyond it that is not.
+
+    Between two samples that are feasible all is taken to be so, until they are part of the longest
+    stance and looked at more closely.
+
+    Returns:
+        Distances along the lines (2, 2, lines): feasible or not, rear or front. Where no sample is
+        feasible, NaN and the ends of the line.
+    """
+    samples = int(min(2.0 * reach / SAMPLING, LONGEST_LINE)) + 1
+    s = np.linspace(-reach, reach, PARTS * (samples - 1) + 1)
+    place, last = np.arange(len(s)), len(s) - 1
+    coarse = is_feasible(lines[:, None], s[::PARTS])
+    known = np.zeros((len(lines), len(s)), dtype=bool)
+    feasible = np.zeros_like(known)
+    known[:, ::PARTS], feasible[:, ::PARTS] = True, coarse
+    for k in range(1, PARTS):
+        feasible[:, k::PARTS] = coarse[:, :-1] & coarse[:, 1:]
+    while True:
+        rear, front = _longest_run(feasible)
+        unsure = (rear[:, None] < place) & (place < front[:, None]) & ~known
+        if not unsure.any():
+            break
+        rows, columns = np.nonzero(unsure)
+        feasible[rows, columns] = is_feasible(lines[rows], s[columns])
+        known |= unsure
+    row = np.arange(len(lines))
+    behind = rear - np.where(known[row, np.clip(rear - 1, 0, last)], 1, PARTS)
+    before = front + np.where(known[row, np.clip(front + 1, 0, last)], 1, PARTS)
+    found = rear >= 0
+    good = np.where(found, s[np.stack([rear, front])], np.nan)
+    bad = s[np.where(found, np.clip([behind, before], 0, last), [[0], [last]])]
+    return np.stack([good, bad])
 
 
 class CommonStep(NamedTuple):
@@ -180,10 +236,11 @@ def common_step(
     """Find the step that all given legs can make at once.
 
     Args:
-        legs: Legs of one robot, by name, mounted with their z axis along the body's.
+        legs: Legs of one robot, by name.
         body_height: Height of the base frame's origin over the ground (...,) [m].
         contact: Ground, required load and moment of each leg; its vectors in the base frame.
-        lateral_offset: Offset of each leg's line from its own origin [m], or a function of the leg.
+        lateral_offset: Horizontal offset of each leg's line from its own origin [m], or a function
+            of the leg.
         direction: Walking direction in the base frame, horizontal (3,).
         criterion: What makes a point feasible.
     """
@@ -191,23 +248,19 @@ def common_step(
     require("contact", contact, Contact)
     if not legs:
         raise ValueRangeError("legs must be at least one leg, got none")
+    along = _horizontal_unit(direction)
+    axes = np.stack([along, _left_of(along), np.array([0.0, 0.0, 1.0])])
     steps = {}
     for name, leg in legs.items():
         require("legs", leg, Leg)
-        offset = lateral_offset(leg) if callable(lateral_offset) else lateral_offset
-        steps[name] = longest_step(
+        mount = leg.mount
+        steps[name] = _longest_stance(
             leg,
-            -as_array("body_height", body_height) - leg.mount.position[2],
-            contact._replace(
-                normal=leg.mount.vectors_to_leg(contact.normal),
-                moment=leg.mount.vectors_to_leg(contact.moment),
-                gravity=None
-                if contact.gravity is None
-                else leg.mount.vectors_to_leg(contact.gravity),
-            ),
-            lateral_offset=offset,
-            direction=leg.mount.vectors_to_leg(direction),
-            criterion=criterion,
+            mount.vectors_to_leg(axes),
+            -as_array("body_height", body_height) - mount.position[2],
+            lateral_offset(leg) if callable(lateral_offset) else lateral_offset,
+            contact.turned(mount.vectors_to_leg),
+            criterion,
         )
     lengths = np.stack([step.length for step in steps.values()], axis=-1)
     return CommonStep(np.min(lengths, axis=-1), np.argmin(lengths, axis=-1), steps)
@@ -217,8 +270,8 @@ def _verdicts(footholds: Footholds, contact: Contact, criterion: Criterion) -> N
     if criterion == Criterion.CAPACITY:
         return footholds.verdict
     solved = np.asarray(footholds.posture.status) == Status.OK
-    slips = footholds.rated_friction > np.asarray(contact.friction)
-    rated = np.where(slips, Verdict.FRICTION, Verdict.FEASIBLE)
+    holds = footholds.rated_friction <= np.asarray(contact.friction)  # NaN at a singularity
+    rated = np.where(holds, Verdict.FEASIBLE, Verdict.FRICTION)
     return np.where(solved, rated, footholds.posture.status).astype(np.uint8)
 
 
@@ -252,6 +305,20 @@ def _horizontal_unit(direction: ArrayLike) -> FloatArray:
     if abs(vector[2]) > 1e-9 * length:
         raise ValueRangeError(f"direction must be horizontal (z = 0), got {vector}")
     return np.array([vector[0], vector[1], 0.0]) / length
+
+
+def _left_of(along: FloatArray) -> FloatArray:
+    return np.array([-along[1], along[0], 0.0])
+
+
+def _check_criterion(mechanism: Mechanism, criterion: Criterion) -> None:
+    """Raise an error for what is no criterion, or not defined for a mechanism."""
+    require("criterion", criterion, Criterion)
+    if criterion == Criterion.RATED_FRICTION and len(mechanism.joints) != 3:
+        raise NotSupportedError(
+            f"criterion RATED_FRICTION: mechanism {mechanism.name!r} has {len(mechanism.joints)} "
+            "actuators; rated friction is that of three"
+        )
 
 
 def _finite(name: str, value: ArrayLike) -> FloatArray:

@@ -14,12 +14,14 @@ from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
 
-LEVEL_GRAVITY = (0.0, 0.0, -9.80665)  # in the frame of a level body [m/s²]
+GRAVITY = 9.80665  # [m/s²]
+LEVEL_GRAVITY = (0.0, 0.0, -GRAVITY)  # in the frame of a level body
 
 
-def gravity_of(leg: Leg) -> FloatArray:
-    """Return gravity in the frame of a leg whose body is level (3,) [m/s²]."""
-    return leg.mount.vectors_to_leg(LEVEL_GRAVITY)
+def level_gravity(leg: Leg) -> tuple[float, float, float]:
+    """Return gravity in the frame of a leg whose body is level [m/s²]."""
+    x, y, z = leg.mount.vertical
+    return -GRAVITY * x, -GRAVITY * y, -GRAVITY * z
 
 
 def weight_efforts(mechanism: Mechanism, posture: Posture, gravity: ArrayLike) -> FloatArray:

@@ -20,6 +20,7 @@ from leg_kinematics.status import Status
 
 POINTS_PER_JOINT = 15  # of the grids that tell bounds and heights
 MOST_POINTS = 10_000_000  # of a grid
+UP = (0.0, 0.0, 1.0)
 MIDDLE = 0.8  # share of the volume that typical heights span
 SECTION_POINTS = 240  # along each axis of a section
 
@@ -114,6 +115,27 @@ def workspace_bounds(mechanism: Mechanism, points_per_joint: int = POINTS_PER_JO
     lower, upper = foot.min(axis=0), foot.max(axis=0)
     margin = 0.02 * np.max(upper - lower) + 0.5 * (upper - lower) / points_per_joint
     return np.stack([lower - margin, upper + margin], axis=-1)
+
+
+def check_heights(mechanism: Mechanism, heights: ArrayLike, up: ArrayLike = UP) -> None:
+    """Raise a ValueRangeError for a height above the leg's origin that no foot can have.
+
+    Below the origin such a height is a question like others; above it, it is a forgotten sign.
+
+    Args:
+        mechanism: The leg's mechanism.
+        heights: Heights over the origin of the leg frame (...) [m].
+        up: Direction in which they count, in the leg frame (3,).
+    """
+    highest = np.max(as_array("height", heights), initial=-np.inf)
+    if not highest > 0.0:
+        return
+    top = float(np.sum(np.max(workspace_bounds(mechanism) * np.reshape(up, (3, 1)), axis=1)))
+    if highest > top:
+        raise ValueRangeError(
+            f"height must be negative below the leg's origin, and the foot reaches no higher than "
+            f"{top:.3g} m, got {highest}"
+        )
 
 
 def initial_height(mechanism: Mechanism) -> float:

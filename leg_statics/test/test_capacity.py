@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import sparse
 from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 
 from leg_kinematics.errors import ShapeError, ValueRangeError
 from leg_statics.capacity.problem import CapacityStatus, load_capacity
@@ -32,9 +33,9 @@ def tangents_of(normal):
     return rows[1:]
 
 
-def capacity_by_socp(jacobian, lower, upper, mu, normal, bias):
+def capacity_by_socp(jacobian, lower, upper, mu, normal, vertical, bias):
     """Capacity by an interior-point solver: (status, capacity)."""
-    normal = np.asarray(normal) / np.linalg.norm(normal)
+    normal, vertical = normal / np.linalg.norm(normal), vertical / np.linalg.norm(vertical)
     frame = np.vstack([tangents_of(normal), normal])
     columns = frame @ jacobian
     size = np.linalg.norm(columns, axis=0)
@@ -47,7 +48,7 @@ def capacity_by_socp(jacobian, lower, upper, mu, normal, bias):
     planes, rooms = planes[keep] / lengths[keep, None], rooms[keep] / lengths[keep]
     unit = _largest_force_of_one_limit(planes, rooms, mu)
     for _ in range(3):  # the second and third time in units of the optimum
-        status, value = _solve_socp(planes, rooms / unit, mu)
+        status, value = _solve_socp(planes, rooms / unit, mu, frame @ vertical)
         if status != BOUNDED or not 0.0 < value < math.inf:
             return status, value * unit
         if 0.1 < value < 10.0:
@@ -64,8 +65,8 @@ def _largest_force_of_one_limit(planes, rooms, mu):
     return bounds.min(initial=np.abs(rooms).max(initial=0.0)) or 1.0
 
 
-def _solve_socp(planes, rooms, mu):
-    """Maximise the third component of a force in the cone: (status, value)."""
+def _solve_socp(planes, rooms, mu, objective):
+    """Maximise the load of a force in the cone: (status, value)."""
     if mu == math.inf:
         cone, rows = [clarabel.NonnegativeConeT(1)], np.array([[0.0, 0.0, -1.0]])
     elif mu == 0.0:
@@ -75,7 +76,7 @@ def _solve_socp(planes, rooms, mu):
         cone = [clarabel.SecondOrderConeT(3)]
         rows = -np.array([[0.0, 0.0, 1.0], [1.0 / mu, 0.0, 0.0], [0.0, 1.0 / mu, 0.0]])
     weights = 1.0 / np.maximum(np.abs(rooms), 1e-3)
-    return clarabel_maximum(UP, planes * weights[:, None], rooms * weights, rows, cone)
+    return clarabel_maximum(objective, planes * weights[:, None], rooms * weights, rows, cone)
 
 
 def clarabel_maximum(objective, planes, rooms, cone_rows, cone):
@@ -103,16 +104,16 @@ def clarabel_maximum(objective, planes, rooms, cone_rows, cone):
     return None, -solution.obj_val
 
 
-def capacity_by_socp_in_efforts(jacobian, lower, upper, mu, normal, bias):
+def capacity_by_socp_in_efforts(jacobian, lower, upper, mu, normal, vertical, bias):
     """The same for an invertible, ill-conditioned J, with efforts as unknowns: F = J^-T e."""
-    normal = np.asarray(normal) / np.linalg.norm(normal)
+    normal, vertical = normal / np.linalg.norm(normal), vertical / np.linalg.norm(vertical)
     up, down = bias - lower, upper - bias
-    forces = np.vstack([tangents_of(normal) / mu, normal]) @ np.linalg.inv(jacobian).T
+    forces = np.vstack([tangents_of(normal) / mu, normal, vertical]) @ np.linalg.inv(jacobian).T
     forces = forces * np.maximum(up, down)
-    unit = np.abs(forces[2]).max()
+    unit = np.abs(forces[3]).max()
     wide = np.maximum(up, down)
     status, value = clarabel_maximum(
-        forces[2] / unit,
+        forces[3] / unit,
         np.vstack([np.eye(3), -np.eye(3)]),
         np.concatenate([up / wide, down / wide]),
         -forces[[2, 0, 1]] / np.abs(forces).max(),
@@ -121,19 +122,21 @@ def capacity_by_socp_in_efforts(jacobian, lower, upper, mu, normal, bias):
     return status, value * unit
 
 
-def reference_capacity(jacobian, lower, upper, mu, normal, bias):
+def reference_capacity(jacobian, lower, upper, mu, normal, vertical, bias):
     """The more accurate of the two formulations: in efforts where the structure carries most."""
-    status, value = capacity_by_socp(jacobian, lower, upper, mu, normal, bias)
+    status, value = capacity_by_socp(jacobian, lower, upper, mu, normal, vertical, bias)
     direct = np.min((upper - lower) / np.linalg.norm(jacobian, axis=0))
     square = jacobian.shape == (3, 3) and np.linalg.matrix_rank(jacobian) == 3
     hard = status is None or (status == BOUNDED and value > 100.0 * direct)
     if hard and square and mu > 0.0:
-        return capacity_by_socp_in_efforts(jacobian, lower, upper, mu, normal, bias)
+        return capacity_by_socp_in_efforts(jacobian, lower, upper, mu, normal, vertical, bias)
+    if status == BOUNDED and value < -1e-9 * direct:
+        return INFEASIBLE, math.nan  # forces push the foot downhill only
     return status, value
 
 
 def random_case(rng, kind):
-    """A random Jacobian with limits, friction, normal and bias."""
+    """A random Jacobian with limits, friction, normal, direction of the load and bias."""
     n = rng.choice([1, 2, 3, 3, 3, 4, 6]) if kind in ("plain", "bias", "powerless") else 3
     jacobian = rng.normal(size=(3, n))
     if kind == "ill-conditioned":
@@ -150,7 +153,14 @@ def random_case(rng, kind):
     bias = 3.0 * rng.normal(size=n) if kind == "bias" else np.zeros(n)
     mu = float(rng.choice([0.0, *rng.uniform(0.0, 1.0, 2), rng.uniform(0.0, 10.0), np.inf]))
     normal = np.array(UP) if rng.random() < 0.5 else np.append(0.5 * rng.normal(size=2), 1.0)
-    return jacobian, lower, upper, mu, normal, bias
+    vertical = normal if rng.random() < 0.3 else np.array(UP)
+    return jacobian, lower, upper, mu, normal, vertical, bias
+
+
+def solved(jacobian, lower, upper, mu, normal, vertical, bias):
+    """The suite's answer to such a case, or to many."""
+    directions = {"normal": normal, "vertical": vertical}
+    return load_capacity(jacobian, lower, upper, mu, **directions, bias_efforts=bias)
 
 
 # --- agreement with independent solvers ---------------------------------------------------------
@@ -163,9 +173,9 @@ def test_capacity_and_status_equal_those_of_an_interior_point_solver(kind):
     rng = np.random.default_rng(7)
     unsolved, outcomes = 0, set()
     for _ in range(300):
-        jacobian, lower, upper, mu, normal, bias = random_case(rng, kind)
-        status, value = reference_capacity(jacobian, lower, upper, mu, normal, bias)
-        result = load_capacity(jacobian, lower, upper, mu, normal=normal, bias_efforts=bias)
+        case = random_case(rng, kind)
+        status, value = reference_capacity(*case)
+        result = solved(*case)
         if status is None:
             unsolved += 1
             continue
@@ -328,7 +338,7 @@ matrices = st.integers(1, 5).flatmap(lambda n: hnp.arrays(float, (3, n), element
 def test_the_force_is_admissible_and_attains_the_capacity(matrix, down, up, mu, side, bias):
     normal = np.array([side, 1.0, 2.0]) / np.linalg.norm([side, 1.0, 2.0])
     ones = np.ones(matrix.shape[1])
-    result = load_capacity(matrix, -down * ones, up * ones, mu, normal=normal, bias_efforts=bias)
+    result = solved(matrix, -down * ones, up * ones, mu, normal, UP, bias)
     if result.status != BOUNDED:
         return
     force = result.force
@@ -336,9 +346,10 @@ def test_the_force_is_admissible_and_attains_the_capacity(matrix, down, up, mu, 
     efforts = bias - matrix.T @ force
     assert np.all(efforts >= -down - rounding)
     assert np.all(efforts <= up + rounding)
-    assert force @ normal == pytest.approx(result.capacity, rel=1e-12)
-    tangential = np.linalg.norm(force - (force @ normal) * normal)
-    assert tangential <= mu * result.capacity + 1e-12 * np.linalg.norm(force)
+    assert force[2] == pytest.approx(result.capacity, rel=1e-12)
+    pressed = force @ normal
+    tangential = np.linalg.norm(force - pressed * normal)
+    assert tangential <= mu * pressed + 1e-12 * np.linalg.norm(force)
 
 
 @settings(max_examples=300, deadline=None)
@@ -375,25 +386,50 @@ def test_capacity_grows_with_friction_and_with_every_limit():
         )
 
 
-def test_turning_about_the_normal_changes_nothing():
+@pytest.mark.parametrize("friction", [0.6, 2.5, np.inf])
+def test_turning_leg_ground_and_gravity_together_changes_nothing(friction):
     rng = np.random.default_rng(14)
-    normal = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
-    cross = np.cross(np.eye(3), normal)
-    angle = 1.1
-    turn = np.eye(3) - math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
-    np.testing.assert_allclose(turn @ normal, normal, atol=1e-15)
+    turn = Rotation.random(200, rng=rng).as_matrix()
     jacobian = rng.normal(size=(200, 3, 3))
-    straight = load_capacity(jacobian, -LIMITS, LIMITS, 0.6, normal=normal)
-    turned = load_capacity(turn @ jacobian, -LIMITS, LIMITS, 0.6, normal=normal)
+    normal = np.append(rng.normal(size=2), 1.0)
+    straight = load_capacity(jacobian, -LIMITS, LIMITS, friction, normal=normal)
+    turned = load_capacity(
+        turn @ jacobian, -LIMITS, LIMITS, friction, normal=turn @ normal, vertical=turn @ UP
+    )
     np.testing.assert_allclose(turned.capacity, straight.capacity, rtol=1e-9)
-    np.testing.assert_allclose(turned.force, straight.force @ turn.T, rtol=1e-6, atol=1e-6)
+    aligned = np.einsum("kij,kj->ki", turn, straight.force)
+    np.testing.assert_allclose(turned.force, aligned, rtol=1e-6, atol=1e-6)
 
 
-def test_normals_of_any_length_and_straight_down_are_normals():
-    down = load_capacity(-LEG, -LIMITS, LIMITS, 0.6, normal=(0.0, 0.0, -7.0))
+def test_directions_of_any_length_and_straight_down_are_directions():
+    down = load_capacity(
+        -LEG, -LIMITS, LIMITS, 0.6, normal=(0.0, 0.0, -7.0), vertical=(0.0, 0.0, -0.1)
+    )
     up = load_capacity(LEG, -LIMITS, LIMITS, 0.6)
     assert down.capacity == pytest.approx(up.capacity, rel=1e-12)
     np.testing.assert_allclose(down.force, -up.force, rtol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [5.0, 40.0, 55.0, 80.0])
+def test_on_a_slope_that_holds_no_force_but_one_the_load_is_its_vertical_part(degrees):
+    """A smooth slope pushes along its normal only, however steep: a joint that holds it tells."""
+    normal = np.array([0.0, -np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+    pressed = 50.0
+    result = load_capacity(normal[:, None], [-pressed], [pressed], 0.0, normal=normal)
+    assert result.capacity == pytest.approx(pressed * normal[2], rel=1e-12)
+    np.testing.assert_allclose(result.force, pressed * normal, rtol=1e-12)
+
+
+def test_the_load_of_a_steep_slope_is_found_though_its_cone_reaches_below_the_horizon():
+    rng = np.random.default_rng(16)
+    for _ in range(200):
+        slope, mu = rng.uniform(0.5, 1.4), rng.uniform(0.7, 5.0)
+        normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
+        if slope + np.arctan(mu) < 0.5 * np.pi:
+            continue
+        jacobian, limits = rng.normal(size=(3, 3)), 10.0 ** rng.uniform(-1.0, 1.0, 3)
+        case = jacobian, -limits, limits, mu, normal, np.array(UP), np.zeros(3)
+        assert solved(*case).capacity == pytest.approx(reference_capacity(*case)[1], rel=1e-6)
 
 
 # --- shapes and misuse --------------------------------------------------------------------------
@@ -403,10 +439,10 @@ def test_a_batch_equals_a_loop_over_single_points():
     rng = np.random.default_rng(15)
     cases = [random_case(rng, "bias") for _ in range(300)]
     cases = [case for case in cases if case[0].shape[1] == 3]
-    batch = [np.stack([np.asarray(case[k]) for case in cases]) for k in range(6)]
-    together = load_capacity(*batch[:4], normal=batch[4], bias_efforts=batch[5])
+    batch = [np.stack([np.asarray(case[k]) for case in cases]) for k in range(7)]
+    together = solved(*batch)
     for k, case in enumerate(cases):
-        single = load_capacity(*case[:4], normal=case[4], bias_efforts=case[5])
+        single = solved(*case)
         for name, value in single._asdict().items():
             np.testing.assert_array_equal(getattr(together, name)[k], value)
 
@@ -435,6 +471,9 @@ def test_leading_axes_broadcast():
         (ValueRangeError, "friction", {"friction": np.nan}),
         (ValueRangeError, "normal", {"normal": [0.0, 0.0, 0.0]}),
         (ValueRangeError, "normal", {"normal": [0.0, np.nan, 1.0]}),
+        (ValueRangeError, "normal must point out", {"normal": [0.1, 0.0, -1.0]}),
+        (ValueRangeError, "normal must point out", {"vertical": [0.0, 0.0, -1.0]}),
+        (ValueRangeError, "vertical", {"vertical": [0.0, 0.0, 0.0]}),
         (ValueRangeError, "effort_lower", {"effort_lower": [-1.0, np.nan, -1.0]}),
         (ValueRangeError, "effort_upper", {"effort_upper": [1.0, -np.inf, 1.0]}),
         (ValueRangeError, "effort_lower", {"effort_lower": [-1.0, 90.0, -1.0]}),

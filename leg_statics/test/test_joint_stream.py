@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from leg_kinematics import Robot, Status, ValueRangeError, load_robot
-from leg_kinematics.robot import Drives, Leg
+from leg_kinematics.robot import Drives, Leg, Mount
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import utilisation
+from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStateError, JointStream, StampOrder
 
@@ -33,6 +35,23 @@ def random_joint_states(robot, count, seed=1):
     position[rng.random(position.shape) < 0.01] = np.nan
     velocity, effort = rng.normal(size=(2, *position.shape))
     return position, velocity, 100.0 * effort
+
+
+def test_load_capacity_of_a_tilted_leg_is_vertical_on_level_ground():
+    """A robot whose hips are turned: legs on both sides carry what a foothold's query says."""
+    robot = load_robot("hexapod")
+    tilts = {name: Rotation.random(rng=k).as_matrix() for k, name in enumerate(robot.legs)}
+    legs = {
+        name: replace(leg, mount=Mount(leg.mount.position, tilts[name]))
+        for name, leg in robot.legs.items()
+    }
+    tilted = replace(robot, legs=legs)
+    position, _, _ = random_joint_states(tilted, 50)
+    states = JointStream(tilted, FRICTION).read(joint_names(tilted), position)
+    for k, leg in enumerate(legs.values()):
+        ok = states.status[:, k] == Status.OK
+        found = evaluate_footholds(leg, states.foot_position[ok, k], Contact(FRICTION))
+        np.testing.assert_allclose(states.load_capacity[ok, k], found.load_capacity, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "quadruped", "walker"])

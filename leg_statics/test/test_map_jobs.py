@@ -121,7 +121,7 @@ def test_the_best_is_the_smallest_or_the_largest_as_the_layer_has_it():
 
 
 def test_a_map_without_values_has_no_best():
-    best, where = best_points(MapMemory(0).plane(key_of(5.0)))
+    best, where = best_points(MapMemory(0).plane(key_of(-5.0)))
     assert np.isnan(best).all()
     assert np.isnan(where).all()
 

@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from leg_kinematics import Leg, ShapeError, ValueRangeError, load_robot
+from leg_kinematics import Leg, NotSupportedError, ShapeError, ValueRangeError, load_robot
+from leg_kinematics.robot import Mount
 from leg_statics.footholds import Contact, Verdict, evaluate_footholds
 from leg_statics.grounds import load_grounds
 from leg_statics.published.paper_000 import STEP, legs
-from leg_statics.step_length import Criterion, common_step, longest_step
+from leg_statics.step_length import Criterion, _brackets, common_step, longest_step
 
 LEGS = {stage: Leg.of(mechanism, (-60.0, 60.0)) for stage, mechanism in legs().items()}
 LEG = LEGS["optimised"]
@@ -109,7 +115,7 @@ def test_the_papers_criterion_asks_for_mu_e_along_the_whole_stance():
 
 
 def test_heights_are_a_batch():
-    heights = np.array([[-0.7, -0.65], [-0.55, 0.5]])
+    heights = np.array([[-0.7, -0.65], [-0.55, -0.1]])
     contact = Contact(0.3, load=150.0)
     together = longest_step(LEG, heights, contact)
     assert together.length.shape == (2, 2)
@@ -148,6 +154,64 @@ def test_the_common_step_is_the_shortest():
         mirror.steps["left_front"].length, mirror.steps["right_front"].length, atol=5e-6
     )
     assert left.length.shape == right.length.shape == (2,)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(2.6e-4, 2e-3)), min_size=1, max_size=4),
+    st.floats(0.0, 1e-3),
+)
+def test_no_stance_spans_a_gap_longer_than_a_quarter_of_a_millimetre(gaps, shift):
+    def is_feasible(line, s):
+        s, _ = np.broadcast_arrays(s, line)
+        inside = np.abs(s - shift) < 0.2
+        for start, length in gaps:
+            inside &= ~((start <= s) & (s <= start + length))
+        return inside
+
+    lines = np.arange(3)
+    good, bad = _brackets(is_feasible, lines, 0.5)
+    assert np.all(is_feasible(lines, good))
+    assert not np.any(is_feasible(lines, bad))
+    rear, front = good[:, 0]
+    for start, length in gaps:
+        assert front < start + length or start < rear
+    np.testing.assert_array_equal(good, good[:, :1].repeat(3, axis=1))
+
+
+def test_the_step_of_a_tilted_leg_is_level_and_bears_its_load_against_gravity():
+    contact = Contact(0.35, load=180.0)
+    for degrees in (0.05, 15.0):
+        tilt = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+        mount = Mount(np.array([0.3, 0.1, 0.02]), tilt)
+        leg = replace(LEG, mount=mount)
+        step = common_step({"leg": leg}, 0.55, contact, lateral_offset=0.05).steps["leg"]
+        assert step.length > 0.05
+        ends = mount.to_base(np.stack([step.start, step.end]))
+        np.testing.assert_allclose(ends[:, 2], -0.55, atol=1e-12)
+        np.testing.assert_allclose(ends[:, 1], 0.1 + 0.05, atol=1e-12)
+        up = mount.vectors_to_leg([0.0, 0.0, 1.0])
+        told = contact._replace(normal=up, gravity=-np.asarray(up))
+        found = evaluate_footholds(LEG, step.positions, told)
+        assert found.feasible.all()
+        np.testing.assert_allclose(found.load_capacity, step.load_capacity, rtol=1e-12)
+        ahead = mount.vectors_to_leg([1e-4, 0.0, 0.0])
+        behind = evaluate_footholds(LEG, step.start - ahead, told).verdict
+        before = evaluate_footholds(LEG, step.end + ahead, told).verdict
+        assert behind == step.start_limit != Verdict.FEASIBLE
+        assert before == step.end_limit != Verdict.FEASIBLE
+
+
+def test_a_leg_without_rated_friction_has_no_step_by_it():
+    leg = load_robot("walker").leg("left_front_inner")
+    with pytest.raises(NotSupportedError, match="RATED_FRICTION"):
+        longest_step(leg, -0.05, Contact(0.4), criterion=Criterion.RATED_FRICTION)
+
+
+def test_a_height_with_a_forgotten_sign_is_refused_and_one_that_is_too_low_has_no_step():
+    with pytest.raises(ValueRangeError, match=r"height must be negative below .* got 0.6"):
+        longest_step(LEG, [-0.6, 0.6], Contact(0.4))
+    assert longest_step(LEG, -6.0, Contact(0.4)).length == 0.0
 
 
 @pytest.mark.parametrize(

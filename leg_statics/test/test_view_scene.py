@@ -121,7 +121,7 @@ def test_all_of_a_leg_is_drawn_at_its_foot_and_in_scale(level):
 
 
 def test_candidates_are_coloured_by_the_verdicts_and_capacities_of_evaluate_footholds(rough):
-    setting = replace(rough.setting, load=700.0, roll=0.05)
+    setting = replace(rough.setting, load=900.0, roll=0.05)
     candidates = scene_of(rough, setting).shapes["candidates"]
     standing, leg = rough.stand(setting), rough.robot.leg(LEG)
     places = rough.terrain.on_ground(candidates.places)

@@ -12,7 +12,7 @@ from leg_kinematics import Leg, Mirrored, Status, load_robot
 from leg_statics import Contact, common_step, evaluate_footholds, load_capacity, longest_step
 from leg_statics.joint_layout import joint_layout
 from leg_statics.leg_state import leg_states
-from leg_statics.weight import LEVEL_GRAVITY, gravity_of, weight_efforts
+from leg_statics.weight import LEVEL_GRAVITY, level_gravity, weight_efforts
 
 ROBOT = load_robot("solo12")
 LEG = ROBOT.leg("FL")
@@ -45,7 +45,7 @@ def test_a_leg_in_the_air_needs_the_efforts_of_its_weight():
     found = evaluate_footholds(LEG, FEET, Contact(0.5))
     np.testing.assert_allclose(
         found.joint_efforts,
-        weight_efforts(LEG.mechanism, found.posture, gravity_of(LEG)),
+        weight_efforts(LEG.mechanism, found.posture, level_gravity(LEG)),
         rtol=1e-12,
         atol=1e-12,
     )
@@ -55,9 +55,9 @@ def test_a_body_on_its_side_loads_other_joints():
     """Turning gravity is turning the whole leg, ground and all, the other way."""
     side = evaluate_footholds(LEG, FEET, Contact(0.5, gravity=(0.0, 9.80665, 0.0)))
     level = evaluate_footholds(LEG, FEET, Contact(0.5))
-    none = evaluate_footholds(LEG, FEET, Contact(0.5, gravity=(0.0, 0.0, 0.0)))
+    least = evaluate_footholds(LEG, FEET, Contact(0.5, gravity=(0.0, 0.0, -1e-12)))
     assert np.abs(side.joint_efforts[:, 0] - level.joint_efforts[:, 0]).min() > 0.01
-    np.testing.assert_allclose(none.joint_efforts, 0.0, atol=1e-15)
+    np.testing.assert_allclose(least.joint_efforts, 0.0, atol=1e-9)
     each = np.tile([[0.0, 9.80665, 0.0]], (len(FEET), 1))
     again = evaluate_footholds(LEG, FEET, Contact(0.5, gravity=each))
     np.testing.assert_array_equal(again.numbers, side.numbers)

@@ -295,7 +295,11 @@ class RobotNode(Node):
             self.log.warning(f"{source} refused", f"{source} refused: {message}")
         return message
 
+    def look_around(self) -> None:
+        """Note in `health` what lasts and is to be told, before each report; nothing by default."""
+
     def _publish_diagnostics(self) -> None:
+        self.look_around()
         status = DiagnosticStatus(
             name=f"{self.get_fully_qualified_name()}: health", hardware_id=self.robot.name
         )

@@ -96,7 +96,7 @@ def index_map(
     height: float,
     resolution: float,
     layers: Sequence[str] = (),
-    ground: Ground | str | float = 0.0,
+    ground: Ground | str | float | None = None,
 ) -> Request[IndexMap]:
     """Return indices over a horizontal plane of a leg's workspace.
 
@@ -104,7 +104,8 @@ def index_map(
         leg: Name of the leg; "" if the robot has exactly one.
         height: z of the plane in the leg's own frame [m].
         resolution: Spacing of the grid [m].
-        layers: Names of indices, or "load_capacity"; none for all that the leg has.
+        layers: Names of indices, or "load_capacity"; none for all that the leg has, load capacity
+            only with a ground.
         ground: The ground, for the layer "load_capacity".
     """
     request = GetIndexMap.Request(
@@ -137,7 +138,7 @@ def compute_index_map(
     leg: str,
     resolution: float,
     layers: Sequence[str] = (),
-    ground: Ground | str | float = 0.0,
+    ground: Ground | str | float | None = None,
     *,
     frame: str = "",
     on_progress: Callable[[MapProgress], None] = lambda progress: None,
@@ -149,7 +150,8 @@ def compute_index_map(
     Args:
         leg: Name of the leg; "" if the robot has exactly one.
         resolution: Spacing of the grid [m].
-        layers: Names of indices, or "load_capacity"; none for all that the leg has.
+        layers: Names of indices, or "load_capacity"; none for all that the leg has, load capacity
+            only with a ground.
         ground: The ground, for the layer "load_capacity".
         frame: Frame of the points: the leg's own ("" or its name) or the base frame.
         on_progress: Called in the client's thread now and then; what it raises ends the work.

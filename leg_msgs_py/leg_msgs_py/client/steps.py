@@ -69,7 +69,7 @@ def query_step_length(
         legs: Name of a leg, or names of several; () for all.
         heights: z of the ground in the frame (...,) [m]; -0.8 if the body is 0.8 m above it.
         ground: The ground: its name, its friction coefficient, or a `Ground` with a normal.
-        load: Force normal to the ground that each leg has to bear [N].
+        load: Vertical force, along z of the base frame, that each leg has to bear [N].
         lateral_offsets: Distance of each leg's line from the origin of its own frame, to the
             left of the walking direction (L,), or one for all [m]; () for none.
         direction: Walking direction, horizontal (3,) of any length; zero is forward.

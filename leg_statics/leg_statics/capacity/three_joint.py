@@ -6,8 +6,8 @@ in this module, so that loops over points are compiled to instructions for sever
 every candidate for the optimum is computed, then the right one is picked.
 
 A joint is the tuple (ax, ay, az, ratio, index) with a = column / up and ratio = up / down, where
-column is that of the Jacobian in the axes across, along, normal. The force (x, y, 1) uses the part
-s = max(a·(x, y, 1), -ratio a·(x, y, 1)) of its limits.
+column is that of the Jacobian along the axes of `problem.load_axes`. The force (x, y, 1) uses the
+part s = max(a·(x, y, 1), -ratio a·(x, y, 1)) of its limits.
 """
 
 # The compiler infers the types of this code; only what Python reads is annotated.
@@ -30,11 +30,11 @@ class ThreeJointCapacity(NamedTuple):
     """Load capacity of one point.
 
     Attributes:
-        capacity: Largest normal force.
-        force: A force that attains it (3,).
+        capacity: Largest load.
+        force: A force that attains it, divided by it (3,).
         limiting_joint: Index of the joint that limits it, as a float.
         friction_limited: Whether the force is on the friction cone.
-        rough: Largest normal force on ground of any roughness.
+        rough: Largest load if the ground gave any force.
         certain: Whether all this is certain; if not, nothing of it counts.
     """
 
@@ -55,27 +55,27 @@ def three_joint_capacity(columns, up, down, mu, axes):
         up: Room for efforts Jᵀ F > 0 (3,).
         down: Room for efforts Jᵀ F < 0 (3,).
         mu: Friction coefficient.
-        axes: The vectors across, along, normal of F = (x, y, 1) / s, see `problem.load_axes`.
+        axes: The three vectors of F = (x, y, 1) / s, see `problem.load_axes`.
     """
     p = _joint(columns[0], up[0], down[0], axes, 0.0)
     q = _joint(columns[1], up[1], down[1], axes, 1.0)
     r = _joint(columns[2], up[2], down[2], axes, 2.0)
     s, x, y, index, on_rim, rough, certain = _solve(p, q, r, mu)
     capacity = 1.0 / s
-    force = force_along(axes, capacity, x, y)
+    force = force_along(axes, 1.0, x, y)
     certain &= _is_ordinary(p) & _is_ordinary(q) & _is_ordinary(r) & (mu >= 0.0)
-    certain &= math.isfinite(force[0] + force[1] + force[2])
+    certain &= math.isfinite(capacity * (force[0] + force[1] + force[2]))
     return ThreeJointCapacity(capacity, force, index, on_rim | (mu == 0.0), 1.0 / rough, certain)
 
 
 @inlined
 def force_along(axes, size, x, y):
-    """Return the force size (x, y, 1) in the axes across, along, normal."""
-    across, along, normal = axes
+    """Return the force size (x, y, 1) in the given axes."""
+    a, b, c = axes
     return (
-        size * (x * across[0] + y * along[0] + normal[0]),
-        size * (x * across[1] + y * along[1] + normal[1]),
-        size * (x * across[2] + y * along[2] + normal[2]),
+        size * (x * a[0] + y * b[0] + c[0]),
+        size * (x * a[1] + y * b[1] + c[1]),
+        size * (x * a[2] + y * b[2] + c[2]),
     )
 
 

@@ -26,7 +26,7 @@ from leg_statics.grounds import Ground
 from leg_statics.indices import find_index, supported_indices
 from leg_statics.maps import CAPACITY_LAYER, line_map, plane_map
 from leg_statics.step_length import Criterion, longest_step
-from leg_statics.weight import gravity_of, weight_efforts
+from leg_statics.weight import level_gravity, weight_efforts
 from leg_statics.workspace import (
     initial_height,
     is_spatial_leg,
@@ -213,7 +213,7 @@ def linkage_picture(
     forces: dict[str, Any] = {"side": None, "front": None}
     if is_spatial_leg(mechanism):
         jacobian = mechanism.jacobian(posture)
-        weight = weight_efforts(mechanism, posture, gravity_of(leg))
+        weight = weight_efforts(mechanism, posture, level_gravity(leg))
         forces["side"] = force_polygon(jacobian[[0, 2]], leg.effort_limits, weight)
         forces["front"] = force_polygon(jacobian[[1, 2]], leg.effort_limits, weight)
     foot = posture.foot_position

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from leg_msgs.msg import Ground
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import DescriptionError, NotSupportedError
@@ -18,7 +19,7 @@ from leg_statics.grounds import Grounds, load_grounds
 if TYPE_CHECKING:  # requests are read without ROS, too
     from leg_kinematics.nodes.robot_node import RobotNode
 
-LEVEL = np.array([0.0, 0.0, 1.0])
+NO_FRICTION_GIVEN = Ground().friction_coefficient
 
 
 def declare_grounds(node: RobotNode) -> Grounds:
@@ -65,10 +66,18 @@ def read_ground(grounds: Grounds, ground: Any, frame: LegFrame) -> Contact:
 
     Raises:
         UnknownNameError: If it names an unknown ground.
-        RequestError: If friction or normal are out of range.
+        RequestError: If friction or normal are out of range, or there is no ground.
     """
-    normal = _finite("ground.normal", ground.normal) if any(ground.normal) else LEVEL
-    return Contact(_friction(grounds, ground), _numbers(frame.vectors_to_leg(normal)))
+    friction = _friction(grounds, ground)
+    if not any(ground.normal):
+        return Contact(friction)
+    normal = _finite("ground.normal", ground.normal)
+    return Contact(friction, _numbers(frame.vectors_to_leg(normal)))
+
+
+def is_ground(ground: Any) -> bool:
+    """Tell whether a `leg_msgs/Ground` says anything of a ground."""
+    return _tells_friction(ground) or any(ground.normal)
 
 
 def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
@@ -81,11 +90,9 @@ def read_contact(grounds: Grounds, request: Any, frame: LegFrame) -> Contact:
     moment = frame.vectors_to_leg(_finite("required_moment", request.required_moment))
     return Contact(
         *read_ground(grounds, request.ground, frame)[:2],
-        load=_magnitude("required_load", request.required_load, "N"),
+        load=magnitude("required_load", request.required_load, "N"),
         moment=_numbers(moment),
-        any_direction_moment=_magnitude(
-            "any_direction_moment", request.any_direction_moment, "N.m"
-        ),
+        any_direction_moment=magnitude("any_direction_moment", request.any_direction_moment, "N.m"),
     )
 
 
@@ -113,6 +120,11 @@ def _friction(grounds: Grounds, ground: Any) -> float:
     if ground.name:
         found = grounds.find(ground.name)
         return found.friction_high if ground.use_high_end else found.friction_low
+    if not _tells_friction(ground):
+        raise RequestError(
+            "ground: neither name nor friction_coefficient is given; allowed: a name "
+            f"({', '.join(grounds.by_name)}), or a friction coefficient >= 0"
+        )
     friction = float(ground.friction_coefficient)
     if not friction >= 0.0:
         raise RequestError(
@@ -121,7 +133,16 @@ def _friction(grounds: Grounds, ground: Any) -> float:
     return friction
 
 
-def _magnitude(field: str, value: float, unit: str) -> float:
+def _tells_friction(ground: Any) -> bool:
+    return bool(ground.name) or ground.friction_coefficient != NO_FRICTION_GIVEN
+
+
+def magnitude(field: str, value: float, unit: str) -> float:
+    """Return a number of a request that is a size.
+
+    Raises:
+        RequestError: If it is negative or not finite.
+    """
     if not 0.0 <= value < np.inf:
         raise RequestError(f"{field}: got {value}; allowed: finite and >= 0 {unit}")
     return float(value)

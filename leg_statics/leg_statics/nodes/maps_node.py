@@ -50,6 +50,7 @@ from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.maps import map_key
 from leg_statics.warm_up import warm_up_statics
 
+LIMITS_TYPE = "leg_msgs/msg/EffortLimits"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -111,7 +112,9 @@ class MapsNode(RobotNode):
         self._moved: dict[str, float] = {}  # positions of joints since the legs were drawn
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
-        self.create_subscription(EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED)
+        self._limits_subscription = self.create_subscription(
+            EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED
+        )
         self.listen(JointState, "joint_states", self.joint_states)
         self.add_post_set_parameters_callback(lambda parameters: self._draw())
         self.robot_changed()
@@ -164,6 +167,20 @@ class MapsNode(RobotNode):
         return list(self.robot.legs.values())
 
     # ------------------------------------------------------------------ effort limits
+
+    def look_around(self) -> None:
+        """Note if no node tells the limits in force, as when the statics node has another name."""
+        note, topic = "effort limits", self._limits_subscription.topic_name
+        self.health.notes.pop(note, None)
+        if self._limits_subscription.get_publisher_count():
+            return
+        told = [name for name, types in self.get_topic_names_and_types() if LIMITS_TYPE in types]
+        elsewhere = [name for name in told if self.count_publishers(name)]
+        self.health.notes[note] = (
+            f"no node publishes {topic}: maps have the limits last heard of, or else the robot "
+            "description's"
+            + (f"; remap statics/effort_limits to {' or '.join(elsewhere)}" if elsewhere else "")
+        )
 
     def effort_limits(self, message: Any) -> None:
         """Take up the effort limits in force."""

@@ -22,7 +22,7 @@ from leg_kinematics.status import Status
 from leg_statics.force_shapes import EDGES, force_polytope, friction_cone
 from leg_statics.maps import IndexMap
 from leg_statics.view.colours import of_values
-from leg_statics.weight import gravity_of, weight_efforts
+from leg_statics.weight import level_gravity, weight_efforts
 
 BAR_WIDTH = 0.008  # m
 LINE_WIDTH = 0.003  # m
@@ -64,10 +64,10 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
     cone: FloatArray = np.empty((0, 3))
     polytope: FloatArray = np.empty((0, 3))
     if posture.status == Status.OK and mechanism.has_point_foot:
-        cone = foot + _cone_lines(scene.friction)
+        cone = foot + _cone_lines(scene.friction, scene.leg.mount.vertical)
         jacobian = mechanism.jacobian(posture)
         if jacobian.shape == (3, 3):
-            weight = weight_efforts(mechanism, posture, gravity_of(scene.leg))
+            weight = weight_efforts(mechanism, posture, level_gravity(scene.leg))
             corners = force_polytope(jacobian, scene.leg.effort_limits, weight)
             polytope = foot + scene.force_scale * corners[np.ravel(EDGES)]
     shapes = (
@@ -118,9 +118,9 @@ def grid_points(index_map: IndexMap) -> FloatArray:
     return points
 
 
-def _cone_lines(friction: float) -> FloatArray:
+def _cone_lines(friction: float, normal: Sequence[float]) -> FloatArray:
     """Return the ends of the lines of a friction cone from its apex (2 per line, 3) [m]."""
-    rim = friction_cone(min(friction, 10.0), (0.0, 0.0, 1.0))
+    rim = friction_cone(min(friction, 10.0), normal)
     rim = CONE_HEIGHT * rim / max(1.0, float(np.linalg.norm(rim[0])) / 2.0)
     rays = np.stack([np.zeros_like(rim[::4]), rim[::4]], axis=1)
     circle = np.stack([rim, np.roll(rim, -1, axis=0)], axis=1)

@@ -28,7 +28,7 @@ from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.joint_pieces import JointPieces, WholeLegs
 from leg_statics.joint_stream import JointStateError, JointStream, StampOrder
 from leg_statics.leg_state import LegStates
-from leg_statics.weight import gravity_of, weight_efforts
+from leg_statics.weight import level_gravity, weight_efforts
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 LIMITS = "leg_msgs/msg/EffortLimits"
@@ -428,7 +428,7 @@ def _required_utilisation(
     """Return the share of its limit that every joint needs to hold a wrench (T, n)."""
     jacobian = leg.mechanism.jacobian(posture)
     efforts = joint_efforts(jacobian, leg.mechanism.angular_jacobian(posture), force, moment)
-    efforts += weight_efforts(leg.mechanism, posture, gravity_of(leg))
+    efforts += weight_efforts(leg.mechanism, posture, level_gravity(leg))
     efforts[posture.status != Status.OK] = np.nan
     return _shares(efforts, leg.effort_limits)
 

@@ -30,7 +30,7 @@ from leg_kinematics.arrays import (
 )
 from leg_kinematics.errors import ShapeError
 from leg_kinematics.status import Status
-from leg_statics.capacity.problem import UP, check_effort_limits, check_normals
+from leg_statics.capacity.problem import UP, check_directions, check_effort_limits
 from leg_statics.stance.balance import INVALID_INPUT, greatest_multiple
 from leg_statics.stance.interior_point import OPTIMAL, UNBOUNDED
 from leg_statics.weight import LEVEL_GRAVITY
@@ -343,7 +343,7 @@ def _solved(feet: Stance, *question: Any) -> Any:
     if not answer[0].size or has_code(answer[0], INVALID_INPUT):
         check_effort_limits(np.asarray(feet.effort_lower), np.asarray(feet.effort_upper))
         as_non_negative("friction", feet.friction)
-        check_normals("normal", np.asarray(feet.normal))
+        check_directions("normal", np.asarray(feet.normal))
     return [found[0] for found in answer] if alone else answer
 
 

@@ -21,7 +21,7 @@ from leg_kinematics.nodes.service import Host, service
 from leg_kinematics.status import Status
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.nodes.contacts import standing_leg
-from leg_statics.weight import gravity_of, weight_efforts
+from leg_statics.weight import level_gravity, weight_efforts
 
 
 @service(ComputeEfforts)
@@ -36,7 +36,7 @@ def compute_efforts(host: Host, request: Any, response: Any) -> None:
     moments = request.moments if len(request.moments) else no_moment
     moments = frame.vectors_to_leg(_vectors("moments", moments, count))
     mechanism = leg.mechanism
-    efforts = weight_efforts(mechanism, posture, gravity_of(leg)) + joint_efforts(
+    efforts = weight_efforts(mechanism, posture, level_gravity(leg)) + joint_efforts(
         mechanism.jacobian(posture), mechanism.angular_jacobian(posture), forces, moments
     )
     status = posture.status.copy()

@@ -13,8 +13,8 @@ from leg_msgs_py.arrays import from_field, to_field
 
 from leg_kinematics.nodes.requests import XYZ, check_count, find_frame, read_rows
 from leg_kinematics.nodes.service import Summary, service
-from leg_statics.footholds import Verdict, evaluate_footholds
-from leg_statics.nodes.contacts import read_bias, read_contact, standing_leg
+from leg_statics.footholds import AROUND, Verdict, evaluate_around, evaluate_footholds
+from leg_statics.nodes.contacts import magnitude, read_bias, read_contact, standing_leg
 from leg_statics.nodes.hosts import GroundsHost
 
 
@@ -33,8 +33,13 @@ def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
     contact = read_contact(host.grounds, request, frame)
     contact = contact._replace(bias_efforts=read_bias(leg, request.bias_efforts))
     positions = read_rows("positions", request.positions, XYZ)
-    check_count("positions", len(positions), host.max_points)
-    found = evaluate_footholds(leg, frame.points_to_leg(positions), contact)
+    feet = frame.points_to_leg(positions)
+    radius = magnitude("radius", request.radius, "m")
+    check_count("positions", len(positions) * (len(AROUND) if radius else 1), host.max_points)
+    if radius:
+        found = evaluate_around(leg, feet, contact, radius)
+    else:
+        found = evaluate_footholds(leg, feet, contact)
     ranking = found.ranking
     response.header.frame_id = request.header.frame_id
     response.verdict = to_field(found.verdict, np.uint8)
@@ -44,6 +49,8 @@ def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
     response.rated_friction_full = to_field(found.rated_friction_full)
     response.friction_margin = to_field(found.friction_margin)
     response.utilisation = to_field(found.utilisation)
+    response.clearance = to_field(found.clearance)
+    response.margin = to_field(found.margin)
     response.limiting_joint = to_field(found.limiting_joint, np.int32)
     response.ranking = to_field(ranking, np.int32)
     response.best = int(ranking[0]) if len(ranking) else -1  # `found.best` would rank again

@@ -14,8 +14,8 @@ from leg_kinematics.nodes.requests import LegFrame, check_count
 from leg_kinematics.nodes.service import service
 from leg_kinematics.robot import Leg
 from leg_statics.map_jobs import MapKey
-from leg_statics.maps import grid_shape
-from leg_statics.nodes.contacts import read_ground
+from leg_statics.maps import CAPACITY_LAYER, grid_shape
+from leg_statics.nodes.contacts import is_ground, read_ground
 from leg_statics.nodes.hosts import GroundsHost, MapsHost
 
 
@@ -48,5 +48,7 @@ def map_key(
     nz, ny, nx = grid_shape(leg.mechanism, request.resolution)
     count = ny * nx * (1 if height is not None else nz)
     check_count("resolution", count, host.max_points)
-    contact = read_ground(host.grounds, request.ground, frame)
-    return MapKey.of(leg, height, request.resolution, tuple(request.layers), contact)
+    layers = tuple(request.layers)
+    needed = CAPACITY_LAYER in layers or is_ground(request.ground)
+    contact = read_ground(host.grounds, request.ground, frame) if needed else None
+    return MapKey.of(leg, height, request.resolution, layers, contact)

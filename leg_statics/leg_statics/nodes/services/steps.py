@@ -32,6 +32,7 @@ from leg_statics.step_length import (
     Criterion,
     common_step,
 )
+from leg_statics.weight import LEVEL_GRAVITY, level_gravity
 
 
 def _summary(response: Any) -> Summary:
@@ -47,11 +48,12 @@ def query_step_length(host: StepsHost, request: Any, response: Any) -> None:
     names = list(request.legs) or list(robot.legs)
     legs = [robot.leg(name) for name in names]
     on_body = _on_body(robot, legs, request.header.frame_id)
+    gravity = LEVEL_GRAVITY if on_body else level_gravity(legs[0])
     if not on_body:
         legs = [replace(legs[0], mount=Mount(np.zeros(3), np.eye(3)))]
     heights = _finite("heights", request.heights)
     check_count("legs and heights", len(legs) * len(heights), host.max_steps, "max_steps")
-    contact = read_contact(host.grounds, request, LegFrame())
+    contact = read_contact(host.grounds, request, LegFrame()).under(gravity)
     offsets = _lateral_offsets(request, legs)
     direction = _finite("direction", request.direction)
     if not direction.any():
@@ -74,7 +76,7 @@ def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:
 
     Raises:
         RequestError: If a leg is named twice, or these legs do not share the frame.
-        NotSupportedError: If a leg has no point foot or does not stand upright on the body.
+        NotSupportedError: If a leg has no point foot.
     """
     names = [leg.name for leg in legs]
     for leg in legs:
@@ -89,12 +91,6 @@ def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:
             f"header.frame_id: got {frame_id!r}; allowed for several legs: '' or "
             f"{robot.base_frame!r}"
         )
-    for leg in legs:
-        if not np.isclose(leg.mount.rotation[2, 2], 1.0):
-            raise NotSupportedError(
-                f"legs: the z axis of {leg.name!r} is not that of {robot.base_frame!r}: ask for "
-                f"this leg alone, in {leg.frame!r}"
-            )
     return True
 
 
