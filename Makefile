@@ -16,7 +16,7 @@ ROBOT ?= hexapod
 TERRAIN ?= level
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run view test test-lowest lint typecheck soak stances bench bench-compare papers clean
+.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare papers clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -57,6 +57,9 @@ soak: setup  ## Record a minute at 1 kHz for six legs and count what is lost
 
 stances: setup  ## Compare the load factors of 10,000 random stances with a conic solver
 	$(VENV_PYTHON) leg_statics/test/stance_oracle.py 10000
+
+contacts: setup  ## Compare what 10,000 contacts of their own carry with a conic solver
+	cd leg_statics/test && $(VENV_PYTHON) test_mixed_contacts.py 10000
 
 bench: setup  ## Measure speed through the public interfaces, and that of other software
 	@echo "Installing what to compare with, unless it is there ..."

@@ -19,7 +19,7 @@ BAD = {
     "fk four joints": ("forward_kinematics", {"joint_positions": [0.1] * 4}, "INVALID_INPUT", ["joint_positions", "got 4"]),
     "fk mode": ("forward_kinematics", {"joint_positions": [0.0] * 3, "assembly_mode": "inside_out"}, "INVALID_INPUT", ["assembly mode", "inside_out", "initial"]),
     "fk all modes": ("forward_kinematics", {"joint_positions": [0.0] * 3, "assembly_mode": "ALL"}, "INVALID_INPUT", ["assembly mode", "ALL"]),
-    "fk frame": ("forward_kinematics", {"joint_positions": [0.0] * 3, "frame": "map"}, "INVALID_INPUT", ["header.frame_id", "map", "left_front_leg", "base_link"]),
+    "fk frame": ("forward_kinematics", {"joint_positions": [0.0] * 3, "frame": "map"}, "INVALID_INPUT", ["header.frame_id", "map", "left_front_leg", "base_link", "base_pose"]),
     "fk too large": ("forward_kinematics", {"joint_positions": [0.0] * 3 * (MAX_POINTS + 1)}, "TOO_LARGE", ["joint_positions", str(MAX_POINTS + 1), str(MAX_POINTS)]),
     "ik unknown leg": ("inverse_kinematics", {"leg": "LEFT_FRONT", "positions": P}, "UNKNOWN_LEG", ["LEFT_FRONT"]),
     "ik one coordinate": ("inverse_kinematics", {"positions": [0.5]}, "INVALID_INPUT", ["positions", "x, y, z", "got 1"]),

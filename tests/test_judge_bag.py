@@ -35,10 +35,11 @@ LEGS = [f"{side}_{end}" for side in ("left", "right") for end in ("front", "midd
 WRENCHES = {leg: f"/{leg}/wrench" for leg in LEGS}
 PLAIN = Topics()
 SAME = {"rtol": 1e-12, "atol": 1e-12}
-STATE_FIELDS = (
-    *("status", "foot_position", "foot_velocity", "condition_number", "load_capacity"),
+STATE_NUMBERS = (
+    *("status", "contact", "condition_number", "load_capacity"),
     *("rated_friction", "rated_friction_full", "utilisation"),
 )
+STATE_FIELDS = (*STATE_NUMBERS, "foot_position", "foot_velocity", "ground_force")
 
 
 def judged(bag, robot, topics=PLAIN, friction=0.4):
@@ -465,7 +466,8 @@ def test_the_copy_has_leg_states_and_all_the_rest(tripod_files):
     for name in ("sensor_msgs/msg/JointState", kind):
         assert message_definition(name).hash in metadata
 
-    stream = JointStream(load_robot("hexapod"), 0.4)
+    robot = load_robot("hexapod")
+    stream = JointStream(robot, 0.4)
     with AnyReader([tripod_files / "copy"]) as reader:
         answers = reader.messages([c for c in reader.connections if c.topic == topic])
         for (connection, time, data), message in zip(
@@ -477,9 +479,15 @@ def test_the_copy_has_leg_states_and_all_the_rest(tripod_files):
             assert answer.header.frame_id == "base_link"
             assert [leg.leg for leg in answer.legs] == LEGS
             states = stream.read(tuple(asked.name), asked.position, asked.velocity, asked.effort)
-            for field in STATE_FIELDS:
+            for field in STATE_NUMBERS:
                 found = np.array([getattr(leg, field) for leg in answer.legs])
                 np.testing.assert_array_equal(found, getattr(states, field))
+            for field in ("foot_position", "foot_velocity", "ground_force"):
+                for k, leg in enumerate(answer.legs):
+                    mount, own = robot.leg(leg.leg).mount, getattr(states, field)[k]
+                    turn = mount.to_base if field == "foot_position" else mount.vectors_to_base
+                    told = getattr(leg, field)
+                    np.testing.assert_array_equal([told.x, told.y, told.z], turn(own))
 
 
 def test_a_damaged_recording_is_judged_up_to_its_damage_and_the_report_says_so(tmp_path, capsys):

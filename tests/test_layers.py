@@ -24,8 +24,8 @@ PAGE = ROOT / "docs" / "architecture.md"
 NEEDS_ROS = {
     *("leg_kinematics.nodes", "leg_statics.nodes"),
     *("leg_msgs_py.recordings", "leg_statics.recordings"),
-    *("leg_msgs_py.client", "leg_msgs_py.clouds", "leg_msgs_py.errors", "leg_msgs_py.grounds"),
-    "leg_msgs_py.losses",
+    *("leg_msgs_py.client", "leg_msgs_py.clouds", "leg_msgs_py.errors", "leg_msgs_py.frames"),
+    *("leg_msgs_py.grounds", "leg_msgs_py.losses"),
 }
 
 WITHOUT_ROS = """

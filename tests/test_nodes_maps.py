@@ -342,14 +342,14 @@ BAD = {
     "leg": ({"leg": "tail"}, "UNKNOWN_LEG", ["tail", LEG]),
     "ground": ({"ground": GroundMessage(name="lava")}, "UNKNOWN_GROUND", ["lava", "cement"]),
     "mu < 0": (
-        {"ground": GroundMessage(friction_coefficient=-0.1)},
+        {"ground": GroundMessage(friction_coefficients=[-0.1])},
         "INVALID_INPUT",
-        ["ground.friction_coefficient", "-0.1"],
+        ["ground.friction_coefficients", "-0.1"],
     ),
     "normal": (
-        {"ground": GroundMessage(name="ice", normal=[math.nan, 0.0, 1.0])},
+        {"ground": GroundMessage(name="ice", normals=[math.nan, 0.0, 1.0])},
         "INVALID_INPUT",
-        ["ground.normal", "nan"],
+        ["ground.normals", "nan"],
     ),
     "layer": ({"layers": ["beauty"]}, "INVALID_INPUT", ["layer", "beauty", "load_capacity"]),
     "resolution 0": ({"resolution": 0.0}, "INVALID_INPUT", ["resolution", "> 0", "0.0"]),
@@ -376,8 +376,8 @@ def test_a_bad_goal_is_ended_with_the_reason(suite, case):
     fields = {"leg": LEG, "resolution": 0.1, **fields}
     ground = fields.pop("ground", None)
     ground = Ground(
-        (ground.name or ground.friction_coefficient) if ground else 0.4,
-        ground.normal if ground else None,
+        (ground.name or ground.friction_coefficients[0]) if ground else 0.4,
+        ground.normals if ground and len(ground.normals) else None,
     )
     with pytest.raises(errors.LegServiceError) as caught:
         suite.client.compute_index_map(ground=ground, **fields)

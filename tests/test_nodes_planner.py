@@ -254,30 +254,30 @@ CEMENT = GroundMessage(name="cement")
 
 # fields, error code, words that the message must have
 BAD_FOOTHOLDS = {
-    "leg": ({"leg": "tail"}, "UNKNOWN_LEG", ["tail", LEG]),
+    "leg": ({"legs": ["tail"]}, "UNKNOWN_LEG", ["tail", LEG]),
     "ground": ({"ground": GroundMessage(name="lava")}, "UNKNOWN_GROUND", ["lava", "cement", "ice"]),
     "mu < 0": (
-        {"ground": GroundMessage(friction_coefficient=-0.1)},
+        {"ground": GroundMessage(friction_coefficients=[-0.1])},
         "INVALID_INPUT",
-        ["ground.friction_coefficient", "-0.1", ">= 0"],
+        ["ground.friction_coefficients", "-0.1", ">= 0"],
     ),
     "mu NaN": (
-        {"ground": GroundMessage(friction_coefficient=math.nan)},
+        {"ground": GroundMessage(friction_coefficients=[math.nan])},
         "INVALID_INPUT",
-        ["ground.friction_coefficient", "nan"],
+        ["ground.friction_coefficients", "nan"],
     ),
     "NaN normal": (
-        {"ground": GroundMessage(name="ice", normal=[0.0, math.nan, 1.0])},
+        {"ground": GroundMessage(name="ice", normals=[0.0, math.nan, 1.0])},
         "INVALID_INPUT",
-        ["ground.normal", "nan", "finite"],
+        ["ground.normals", "nan", "finite"],
     ),
     "no ground": (
         {"ground": GroundMessage()},
         "INVALID_INPUT",
-        ["ground", "neither name nor friction_coefficient", "cement", ">= 0"],
+        ["ground", "neither name nor friction_coefficients", "cement", ">= 0"],
     ),
     "normal into the ground": (
-        {"ground": GroundMessage(name="ice", normal=[0.1, 0.0, -1.0])},
+        {"ground": GroundMessage(name="ice", normals=[0.1, 0.0, -1.0])},
         "INVALID_INPUT",
         ["normal", "out of the ground", "0.1", "-1.0"],
     ),
@@ -287,16 +287,20 @@ BAD_FOOTHOLDS = {
         "TOO_LARGE",
         ["positions", str(MAX_POINTS), "max_points"],
     ),
-    "negative load": ({"required_load": -1.0}, "INVALID_INPUT", ["required_load", "-1.0", ">= 0"]),
-    "NaN load": ({"required_load": math.nan}, "INVALID_INPUT", ["required_load", "nan"]),
-    "infinite load": ({"required_load": math.inf}, "INVALID_INPUT", ["required_load", "inf"]),
+    "negative load": (
+        {"required_load": [-1.0]},
+        "INVALID_INPUT",
+        ["required_load", "-1.0", ">= 0"],
+    ),
+    "NaN load": ({"required_load": [math.nan]}, "INVALID_INPUT", ["required_load", "nan"]),
+    "infinite load": ({"required_load": [math.inf]}, "INVALID_INPUT", ["required_load", "inf"]),
     "moment": (
         {"required_moment": [0.0, math.inf, 0.0]},
         "INVALID_INPUT",
         ["required_moment", "inf", "finite"],
     ),
     "moment < 0": (
-        {"any_direction_moment": -2.0},
+        {"any_direction_moment": [-2.0]},
         "INVALID_INPUT",
         ["any_direction_moment", "-2.0", ">= 0"],
     ),
@@ -352,7 +356,7 @@ BAD_STEPS = {
 GOOD = {
     "query_footholds": (
         QueryFootholds,
-        {"leg": LEG, "positions": P, "ground": CEMENT},
+        {"legs": [LEG], "positions": P, "ground": CEMENT},
         BAD_FOOTHOLDS,
     ),
     "query_step_length": (

@@ -9,7 +9,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from leg_msgs.msg import LegStates, PointStatus
+from leg_msgs.msg import LegState, LegStates, PointStatus
 from leg_msgs_py.losses import subscribe_raw
 from nodes_support import set_parameter, wait_for
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
@@ -86,6 +86,11 @@ class Stream:
         return int(self.value("dropped: joint_states") or 0)
 
 
+def numbers_of(vector):
+    """Return a point or vector of geometry_msgs as numbers."""
+    return [vector.x, vector.y, vector.z]
+
+
 RIGHT_REAR = [f"right_rear_crank_{k}" for k in (1, 2, 3)]
 LEFT_FRONT = [f"left_front_crank_{k}" for k in (1, 2, 3)]
 JOINTS = [0.1, -0.05, 0.08]
@@ -104,8 +109,14 @@ def test_all_values_equal_the_library(stream, hexapod):
     jacobian = leg.mechanism.jacobian(posture)
     lower, upper = leg.effort_limits.T
     same = {"rtol": 1e-12, "atol": 1e-12}
-    np.testing.assert_allclose(state.foot_position, posture.foot_position, **same)
-    np.testing.assert_allclose(state.foot_velocity, jacobian @ rates, **same)
+    mount = leg.mount
+    foot = mount.to_base(posture.foot_position)
+    np.testing.assert_allclose(numbers_of(state.foot_position), foot, **same)
+    velocity = mount.vectors_to_base(jacobian @ rates)
+    np.testing.assert_allclose(numbers_of(state.foot_velocity), velocity, **same)
+    force = mount.vectors_to_base(np.linalg.solve(jacobian.T, np.negative(efforts)))
+    np.testing.assert_allclose(numbers_of(state.ground_force), force, rtol=1e-9)
+    assert state.contact == (LegState.ON_THE_GROUND if force[2] >= 10.0 else LegState.IN_THE_AIR)
     np.testing.assert_allclose(state.condition_number, condition_number(jacobian), **same)
     np.testing.assert_allclose(state.rated_friction, rated_friction(jacobian), **same)
     np.testing.assert_allclose(state.rated_friction_full, rated_friction_full(jacobian), **same)
@@ -118,7 +129,9 @@ def test_all_values_equal_the_library(stream, hexapod):
 
 def test_without_velocity_and_effort_their_values_are_unknown(stream):
     state = stream.ask(LEFT_FRONT, JOINTS)["left_front"]
-    assert np.isnan(state.foot_velocity).all()
+    assert np.isnan(numbers_of(state.foot_velocity)).all()
+    assert np.isnan(numbers_of(state.ground_force)).all()
+    assert state.contact == LegState.CONTACT_UNKNOWN
     assert math.isnan(state.utilisation)
     assert state.load_capacity > 0.0
 
@@ -130,8 +143,8 @@ def test_all_legs_come_in_the_order_of_the_description(stream, hexapod):
     assert list(states) == list(hexapod.legs)
     for name, leg in hexapod.legs.items():
         joints = [positions[names.index(joint)] for joint in leg.joint_names]
-        foot = leg.mechanism.forward(joints).foot_position
-        np.testing.assert_allclose(states[name].foot_position, foot, atol=1e-12)
+        foot = leg.mount.to_base(leg.mechanism.forward(joints).foot_position)
+        np.testing.assert_allclose(numbers_of(states[name].foot_position), foot, atol=1e-12)
 
 
 def test_the_header_has_the_stamp_of_the_joint_states_and_the_base_frame(stream, hexapod):
@@ -173,7 +186,7 @@ def test_one_joint_a_message_updates_its_leg(stream):
     for joint, position in zip(LEFT_FRONT[:-1], JOINTS[:-1], strict=True):
         stream.send([joint], [position])
     state = stream.ask(LEFT_FRONT[-1:], JOINTS[-1:])["left_front"]
-    assert state.foot_position.tolist() == whole.foot_position.tolist()
+    assert state.foot_position == whole.foot_position
     assert state.load_capacity == whole.load_capacity
 
 
@@ -189,7 +202,7 @@ def test_a_leg_that_lacks_a_joint_is_not_updated_and_named(stream):
 def test_a_position_that_is_not_finite_is_invalid_input_for_its_leg_only(stream, bad):
     states = stream.ask([*LEFT_FRONT, *RIGHT_REAR], [bad, *[0.0] * 5])
     assert states["left_front"].status == PointStatus.INVALID_INPUT
-    assert np.isnan(states["left_front"].foot_position).all()
+    assert np.isnan(numbers_of(states["left_front"].foot_position)).all()
     assert math.isnan(states["left_front"].load_capacity)
     assert states["right_rear"].status == PointStatus.OK
 
@@ -197,7 +210,7 @@ def test_a_position_that_is_not_finite_is_invalid_input_for_its_leg_only(stream,
 def test_a_pose_beyond_the_joint_limits_has_a_foot_but_no_capacity(stream):
     state = stream.ask(LEFT_FRONT, [0.4, 0.4, 0.0])["left_front"]
     assert state.status == PointStatus.JOINT_LIMIT
-    assert np.isfinite(state.foot_position).all()
+    assert np.isfinite(numbers_of(state.foot_position)).all()
     assert math.isnan(state.load_capacity)
 
 
@@ -243,6 +256,21 @@ def test_more_friction_never_lowers_the_load_capacity(stream, suite):
     finally:
         assert set_parameter(node, "statics", "friction_coefficient", 0.4).successful
     assert stream.ask(LEFT_FRONT, JOINTS)["left_front"].load_capacity == slippery
+
+
+def test_loads_count_against_the_gravity_that_the_node_is_told(stream, suite, hexapod):
+    node, pitched = suite.client.node, [3.0, 0.0, -9.3]
+    assert not set_parameter(node, "statics", "gravity", [0.0, 0.0, 0.0]).successful
+    assert set_parameter(node, "statics", "gravity", pitched).successful
+    try:
+        state = stream.ask(LEFT_FRONT, JOINTS)["left_front"]
+    finally:
+        assert set_parameter(node, "statics", "gravity", [0.0, 0.0, -9.80665]).successful
+    feet = hexapod.legs["left_front"].mechanism.forward(JOINTS).foot_position
+    found = suite.client.query_footholds("left_front", feet, 0.4, gravity=pitched)
+    np.testing.assert_allclose(state.load_capacity, found.load_capacity, rtol=1e-6)
+    level = suite.client.query_footholds("left_front", feet, 0.4)
+    assert abs(found.load_capacity - level.load_capacity) > 1.0
 
 
 def test_the_rate_of_states_can_be_limited(stream, suite):

@@ -211,7 +211,7 @@ def test_the_summary_says_what_the_planner_was_answered(recorded):
 def test_recorded_answers_equal_direct_calls_of_the_library(recorded):
     bag, leg = Bag(recorded[0]), load_robot("hexapod").leg("right_rear")
     events = [bag.decode(message) for message in bag.messages([FOOTHOLDS])]
-    (asked,) = (e for e in events if e.request and e.request[0].leg == leg.name)
+    (asked,) = (e for e in events if e.request and e.request[0].legs == [leg.name])
     number = asked.info.sequence_number
     (told,) = (e for e in events if e.response and e.info.sequence_number == number)
     request, response = asked.request[0], told.response[0]
@@ -284,7 +284,7 @@ def test_a_topic_of_another_type_is_told(recorded, tmp_path):
 
 def test_events_of_another_version_are_told(recorded, tmp_path):
     bag = Bag(recorded[0])
-    older = bag.topics[FOOTHOLDS].definition.data.replace("int32 best ", "int64 best ")
+    older = bag.topics[FOOTHOLDS].definition.data.replace("int32[] best ", "int64[] best ")
     definition = bag.topics[FOOTHOLDS].definition._replace(data=older)
     with BagWriter(tmp_path / "bag") as writer:
         writer.copy_topic(bag.topics[FOOTHOLDS]._replace(definition=definition), bag.types)

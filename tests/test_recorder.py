@@ -80,7 +80,8 @@ def test_a_definition_has_the_comments_and_all_types_it_needs():
     first, *others = text.split("=" * 80)
     assert "# one per leg, in the order of the robot description" in first
     assert [part.split("\n")[1] for part in others] == [
-        *("MSG: builtin_interfaces/Time", "MSG: leg_msgs/LegState", "MSG: std_msgs/Header")
+        *("MSG: builtin_interfaces/Time", "MSG: geometry_msgs/Point", "MSG: geometry_msgs/Vector3"),
+        *("MSG: leg_msgs/LegState", "MSG: std_msgs/Header"),
     ]
     assert digest.startswith("RIHS01_")
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Vector3
 from leg_msgs.msg import LegState, LegStates
 from leg_msgs_py.arrays import to_field
 from leg_msgs_py.recordings import replay_flow as player
@@ -40,6 +41,7 @@ from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStateError, JointStream
 from leg_statics.recordings.bag_judge import BagJudge, Topics
 from leg_statics.recordings.judged_bag import JudgedBag
+from leg_statics.weight import LEVEL_GRAVITY
 
 pytest_plugins = ["leg_msgs_py.recordings.pytest_replay"]
 
@@ -64,10 +66,27 @@ def judged_offline(path, robot, folder):
     return read_messages(folder, [STATES])
 
 
+def point(numbers):
+    return Point(**dict(zip("xyz", map(float, numbers), strict=True)))
+
+
+def vector(numbers):
+    return Vector3(**dict(zip("xyz", map(float, numbers), strict=True)))
+
+
+def contact_of(force):
+    """Return the contact that a force in a level leg frame tells."""
+    return LegState.ON_THE_GROUND if force[2] >= 10.0 else LegState.IN_THE_AIR
+
+
 def states_by_elementary_calls(robot, messages):
     """Return the leg states of a walk, leg by leg from the functions of the library."""
     states = [
-        LegStates(header=Header(stamp=m.header.stamp, frame_id=robot.base_frame)) for m in messages
+        LegStates(
+            header=Header(stamp=m.header.stamp, frame_id=robot.base_frame),
+            gravity=vector(LEVEL_GRAVITY),
+        )
+        for m in messages
     ]
     for leg in robot.legs.values():
         columns = [messages[0].name.index(joint) for joint in leg.joint_names]
@@ -85,13 +104,17 @@ def states_by_elementary_calls(robot, messages):
         }
         capacity = load_capacity(jacobian, limits[:, 0], limits[:, 1], FRICTION).capacity
         used, _ = utilisation(efforts, limits)
+        forces = np.linalg.solve(np.swapaxes(jacobian, -1, -2), -efforts[..., None])[..., 0]
+        mount = leg.mount
         for k, message in enumerate(states):
             message.legs.append(
                 LegState(
                     leg=leg.name,
                     joint_positions=to_field(q[k]),
-                    foot_position=posture.foot_position[k],
-                    foot_velocity=jacobian[k] @ rates[k],
+                    foot_position=point(mount.to_base(posture.foot_position[k])),
+                    foot_velocity=vector(mount.vectors_to_base(jacobian[k] @ rates[k])),
+                    ground_force=vector(mount.vectors_to_base(forces[k])),
+                    contact=contact_of(forces[k]),
                     condition_number=float(indices["condition_number"][k]),
                     load_capacity=float(capacity[k]),
                     rated_friction=float(indices["rated_friction"][k]),
@@ -139,7 +162,7 @@ def test_faults_are_judged_the_same_live_offline_and_directly_and_stop_nothing(
             refused += 1
             continue
         if states.legs:
-            expected.append(message_of(joints.header.stamp, hexapod.base_frame, states))
+            expected.append(message_of(joints.header.stamp, hexapod, states))
     assert refused + bag.counts["/joint_states"] - len(expected) > len(FAULTS)
     live = replay.play(BAGS / "hexapod_faults", rate=math.inf)
     assert_same(live, {STATES: expected})
@@ -147,27 +170,31 @@ def test_faults_are_judged_the_same_live_offline_and_directly_and_stop_nothing(
     assert suite.nodes.ended() == {}
 
 
-def message_of(stamp, frame, states):
+def message_of(stamp, robot, states):
     """Return the message of leg states."""
     fields = zip(*states[1:], strict=True)
+    stamp = Time(sec=stamp.sec, nanosec=stamp.nanosec)
     return LegStates(
-        header=Header(stamp=Time(sec=stamp.sec, nanosec=stamp.nanosec), frame_id=frame),
+        header=Header(stamp=stamp, frame_id=robot.base_frame),
+        gravity=vector(LEVEL_GRAVITY),
         legs=[
             LegState(
                 leg=leg,
                 joint_positions=to_field(joints),
                 status=int(status),
-                foot_position=foot,
-                foot_velocity=velocity,
+                foot_position=point(robot.legs[leg].mount.to_base(foot)),
+                foot_velocity=vector(robot.legs[leg].mount.vectors_to_base(velocity)),
+                ground_force=vector(robot.legs[leg].mount.vectors_to_base(force)),
+                contact=int(contact),
                 condition_number=float(condition),
                 load_capacity=float(capacity),
                 rated_friction=float(mu),
                 rated_friction_full=float(mu_full),
                 utilisation=float(used),
             )
-            for leg, (
-                *(joints, status, foot, velocity, condition, capacity, mu, mu_full, used),
-            ) in zip(states.legs, fields, strict=True)
+            for leg, row in zip(states.legs, fields, strict=True)
+            for joints, status, foot, velocity, force, contact, *numbers in [row]
+            for condition, capacity, mu, mu_full, used in [numbers]
         ],
     )
 
@@ -338,15 +365,15 @@ def test_a_difference_tells_topic_number_field_values_and_size():
 
 
 def test_tolerances_hold_for_the_fields_they_name():
-    got = walk_states(foot_position=[0.0, 0.0, 1e-7])
+    got = walk_states(foot_position=Point(z=1e-7))
     got[3].legs[0].load_capacity = 400.3  # of both legs: they are one object
     args = {STATES: got}, {STATES: walk_states()}
     fields = {d.field for d in differences(*args)}
     assert fields == {
-        *("legs[0].foot_position[2]", "legs[1].foot_position[2]"),
+        *("legs[0].foot_position.z", "legs[1].foot_position.z"),
         *("legs[0].load_capacity", "legs[1].load_capacity"),
     }
-    feet = {"*.foot_position": Tolerance(absolute=1e-6)}
+    feet = {"*.foot_position.*": Tolerance(absolute=1e-6)}
     assert {d.field for d in differences(*args, feet)} == {
         *("legs[0].load_capacity", "legs[1].load_capacity")
     }

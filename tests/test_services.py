@@ -44,8 +44,9 @@ REQUESTS = {
     "get_leg_description": {},
     "query_footholds": {
         "positions": [*FOOT, 0.0, 0.0, -9.0],
+        "legs": ["left_front"],
         "ground": CEMENT,
-        "required_load": 200.0,
+        "required_load": [200.0],
         "include_efforts": True,
     },
     "query_step_length": {"legs": ["left_front"], "heights": [-0.65], "ground": CEMENT},
@@ -61,6 +62,9 @@ class Host:
     def __init__(self, robot):
         self.robot = robot
         self.grounds = load_grounds("grounds")
+
+    def base_pose(self, frame_id, stamp):
+        raise AssertionError("no request here needs tf")
 
     def plane(self, leg, key):
         return query_judge.MapMemory(0).plane(key)
@@ -109,6 +113,8 @@ def as_recorded(types, message, name):
             values[field] = as_recorded(types, value, "/msg/".join(kind.split("/")))
         elif isinstance(value, array.array):
             values[field] = np.array(value)
+        elif kind == "sequence<boolean>":
+            values[field] = np.array(value, dtype=bool)
     return types.types[name](**values)
 
 

@@ -55,7 +55,9 @@ def ready_footholds() -> Any:
     return QueryFootholds.Response(
         **{name: to_field(np.ones(1)) for name in (*numbers, "utilisation", "clearance", "margin")},
         **{name: to_field(np.zeros(1), np.uint8) for name in ("verdict", "status")},
-        **{name: to_field(np.zeros(1), np.int32) for name in ("limiting_joint", "ranking")},
+        **{name: to_field(np.zeros(1), np.int32) for name in ("limiting_joint", "ranking", "best")},
+        friction_coefficients=to_field(np.ones(1)),
+        weight_counted=[False],
     )
 
 

@@ -82,6 +82,9 @@ def rows(settings: Settings) -> Iterator[Row]:
         )
         yield from percentiles(f"inverse_kinematics, {BATCH:,} points", samples["points"])
         if footholds is not None:
+            yield from mixed_contacts(
+                lambda request: client.call(footholds, request), feet, settings
+            )
             yield from parts_of_footholds(
                 lambda: decode_footholds(client.call(footholds, foothold_request(feet))),
                 feet,
@@ -130,6 +133,20 @@ def through_leg_client(foot: FloatArray, settings: Settings) -> Iterator[Row]:
         )
     note = "a client with a thread of its own"
     yield from percentiles("LegClient.inverse_kinematics", samples["ask"], note=note)
+
+
+def mixed_contacts(
+    call: Callable[[Any], Any], feet: FloatArray, settings: Settings
+) -> Iterator[Row]:
+    """Yield what a contact of its own for each candidate costs, beside one for all."""
+    one, mixed = foothold_request(feet), mixed_request(feet)
+    requests = {"one": lambda: call(one), "mixed": lambda: call(mixed)}
+    durations = sample(requests, settings.count(200, 10))
+    name = f"query_footholds, {BATCH:,} mixed contacts"
+    yield from percentiles(name, durations["mixed"])
+    share = float(np.median(durations["mixed"]) / np.median(durations["one"]))
+    note = "friction, normal and load of each candidate"
+    yield Row(f"{name} / one contact", share, "x", goal=Goal(1.2), note=note)
 
 
 def parts_of_footholds(
@@ -206,11 +223,23 @@ def decode_inverse(response: Any) -> FloatArray:
 def foothold_request(feet: FloatArray) -> Any:
     """Return a request for foothold candidates."""
     return QueryFootholds.Request(
-        leg=LEG,
+        legs=[LEG],
         positions=to_field(feet),
-        ground=Ground(friction_coefficient=FRICTION),
-        required_load=float(np.asarray(CONTACT.load)),
+        ground=Ground(friction_coefficients=[FRICTION]),
+        required_load=to_field(CONTACT.load),
     )
+
+
+def mixed_request(feet: FloatArray) -> Any:
+    """Return the same with a friction, a normal and a load for each candidate."""
+    random, request = np.random.default_rng(1), foothold_request(feet)
+    count = len(feet)
+    request.ground = Ground(
+        friction_coefficients=to_field(random.uniform(0.2, 1.0, count)),
+        normals=to_field(random.normal(size=(count, 3)) * 0.2 + [0.0, 0.0, 1.0]),
+    )
+    request.required_load = to_field(random.uniform(0.5, 1.5, count) * float(CONTACT.load))
+    return request
 
 
 def decode_footholds(response: Any) -> dict[str, Any]:

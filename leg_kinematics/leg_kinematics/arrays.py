@@ -120,6 +120,15 @@ def as_non_negative(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
+def combined(vectors: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return vectors (..., 3) times a matrix of rows (3, 3), one or many by the same bits.
+
+    A product of matrices adds up in an order of its own for each number of vectors.
+    """
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.stack([x * a + y * b + z * c for a, b, c in rows.T.tolist()], axis=-1)
+
+
 def wrapped_angles(angles: ArrayLike) -> FloatArray:
     """Return the angles (...) in [-pi, pi) that differ by whole turns [rad]."""
     array = np.asarray(angles, np.float64)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_kinematics.arguments import require
-from leg_kinematics.arrays import FloatArray, as_array, as_matching
+from leg_kinematics.arrays import FloatArray, as_array, as_matching, combined
 from leg_kinematics.errors import ShapeError, UnknownNameError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism, Posture
 from leg_kinematics.mirrored import Mirrored
@@ -39,6 +39,12 @@ class Mount:
         x, y, z = self.rotation[2].tolist()
         return x, y, z
 
+    def within(self, base: Mount) -> Mount:
+        """Return where the leg frame is in a frame in which the base frame is so."""
+        if base is BASE:
+            return self
+        return Mount(base.to_base(self.position), base.rotation @ self.rotation)
+
     def to_base(self, points: ArrayLike) -> FloatArray:
         """Turn points (..., 3) of the leg frame into the base frame [m]."""
         return self.vectors_to_base(points) + self.position
@@ -49,11 +55,14 @@ class Mount:
 
     def vectors_to_base(self, vectors: ArrayLike) -> FloatArray:
         """Turn free vectors (..., 3) of the leg frame into the base frame."""
-        return as_array("vectors", vectors, 3) @ self.rotation.T
+        return combined(as_array("vectors", vectors, 3), self.rotation.T)
 
     def vectors_to_leg(self, vectors: ArrayLike) -> FloatArray:
         """Turn free vectors (..., 3) of the base frame into the leg frame."""
-        return as_array("vectors", vectors, 3) @ self.rotation
+        return combined(as_array("vectors", vectors, 3), self.rotation)
+
+
+BASE = Mount(np.zeros(3), np.eye(3))  # of the base frame itself
 
 
 @dataclass(frozen=True)
@@ -135,11 +144,10 @@ class Leg:
         limits = as_matching("effort_limits", effort_limits, (2,), (len(joints),))
         if limits.ndim > 2:
             raise ShapeError(f"effort_limits must have shape (n, 2), got {limits.shape}")
-        mount = Mount(np.zeros(3), np.eye(3))
         rows = np.broadcast_to(limits, (len(joints), 2)).copy()
         name = mechanism.name
         passive = tuple(joint.name for joint in mechanism.passive_joints)
-        return cls(name, name, mechanism, mount, name, joints, passive, rows)
+        return cls(name, name, mechanism, BASE, name, joints, passive, rows)
 
     def tree_joint_names(self) -> tuple[str, ...]:
         """Names in the robot of the joints of the mechanism's `body_tree`, in their order.

@@ -45,14 +45,16 @@ class Contact(NamedTuple):
             stands for 1e8.
         normal: Normal of the ground in the leg frame, out of it and upwards, of any length
             (..., 3); None = level.
-        load: Required vertical component of the ground's force (...,) [N].
+        load: Required component of the ground's force in the direction of the load (...,) [N].
         moment: Moment that the ground applies to the foot (..., 3) [N.m]; zero on hard ground.
-        any_direction_moment: Magnitude of a horizontal moment of unknown direction that must be
-            borne on top (...,) [N.m]: the worst case over directions, equation (27).
+        any_direction_moment: Magnitude of a moment of unknown direction, across that of the load,
+            that must be borne on top (...,) [N.m]: the worst case over directions, equation (27).
         bias_efforts: Efforts that the actuators exert anyway (..., n) or one for all, on top of
             those that hold the leg's own weight if its masses are known [N.m or N].
-        gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²], against which loads
-            count; None = that of a level body.
+        gravity: Acceleration of gravity in the leg frame (..., 3) [m/s²]; None = that of a level
+            body.
+        load_direction: Direction in which loads count, of any length (..., 3); None = against
+            gravity.
     """
 
     friction: ArrayLike
@@ -62,34 +64,47 @@ class Contact(NamedTuple):
     any_direction_moment: ArrayLike = 0.0
     bias_efforts: ArrayLike = 0.0
     gravity: ArrayLike | None = None
+    load_direction: ArrayLike | None = None
 
     def under(self, gravity: ArrayLike) -> Contact:
         """Return the same with the directions that are not given, under a given gravity."""
-        gravity = as_array("gravity", gravity if self.gravity is None else self.gravity, 3)
-        normal = np.negative(gravity) if self.normal is None else self.normal
-        return self._replace(normal=normal, gravity=gravity)
+        down = as_array("gravity", gravity if self.gravity is None else self.gravity, 3)
+        up = np.negative(down)
+        return self._replace(
+            normal=up if self.normal is None else self.normal,
+            gravity=down,
+            load_direction=up if self.load_direction is None else self.load_direction,
+        )
 
     def spread(self) -> Contact:
         """Return the same for several points of each candidate, along a last axis (..., m)."""
         return self._replace(
             friction=np.expand_dims(self.friction, -1),
-            normal=None if self.normal is None else np.expand_dims(self.normal, -2),
+            normal=_spread(self.normal),
             load=np.expand_dims(self.load, -1),
             moment=np.expand_dims(self.moment, -2),
             any_direction_moment=np.expand_dims(self.any_direction_moment, -1),
             bias_efforts=np.expand_dims(self.bias_efforts, -2)
             if np.ndim(self.bias_efforts)
             else self.bias_efforts,
-            gravity=None if self.gravity is None else np.expand_dims(self.gravity, -2),
+            gravity=_spread(self.gravity),
+            load_direction=_spread(self.load_direction),
         )
 
     def turned(self, turn: Callable[[ArrayLike], FloatArray]) -> Contact:
         """Return the same in another frame, into which `turn` takes vectors (..., 3)."""
-        return self._replace(
-            normal=None if self.normal is None else turn(self.normal),
-            moment=turn(self.moment),
-            gravity=None if self.gravity is None else turn(self.gravity),
+        normal, gravity, direction = (
+            None if vectors is None else turn(vectors)
+            for vectors in (self.normal, self.gravity, self.load_direction)
         )
+        return self._replace(
+            normal=normal, moment=turn(self.moment), gravity=gravity, load_direction=direction
+        )
+
+
+def _spread(vectors: ArrayLike | None) -> FloatArray | None:
+    """Return vectors (..., 3), if there are any, with an axis more before the last."""
+    return None if vectors is None else np.expand_dims(vectors, -2)
 
 
 def contact_rows(contact: Contact, leg: Leg) -> FloatArray:
@@ -119,6 +134,7 @@ def _arrays(contact: Contact, gravity: ArrayLike, n: int) -> Contact:
         as_array("any_direction_moment", contact.any_direction_moment),
         as_vectors("bias_efforts", contact.bias_efforts, n),
         as_array("gravity", cast(ArrayLike, contact.gravity), 3),
+        as_array("load_direction", cast(ArrayLike, contact.load_direction), 3),
     )
 
 
@@ -137,6 +153,7 @@ def _leading_shapes(contact: Any) -> dict[str, tuple[int, ...]]:
         "any_direction_moment": contact.any_direction_moment.shape,
         "bias_efforts": contact.bias_efforts.shape[:-1],
         "gravity": contact.gravity.shape[:-1],
+        "load_direction": contact.load_direction.shape[:-1],
     }
 
 
@@ -146,7 +163,7 @@ def _joined(contact: Contact, n: int) -> FloatArray:
     row = np.empty((OF_CONTACT + n, *batch[::-1])).T  # each field in one piece of memory
     row[..., MU] = contact.friction
     row[..., NORMAL:VERTICAL] = contact.normal
-    row[..., VERTICAL:LOAD] = -cast(FloatArray, contact.gravity)
+    row[..., VERTICAL:LOAD] = contact.load_direction
     row[..., LOAD] = contact.load
     row[..., MOMENT:ANY_MOMENT] = contact.moment
     row[..., ANY_MOMENT] = contact.any_direction_moment
@@ -157,9 +174,9 @@ def _joined(contact: Contact, n: int) -> FloatArray:
 def check_contact(contact: Contact, leg: Leg) -> None:
     """Raise a ValueRangeError for a value that is out of range."""
     contact = _arrays(contact, level_gravity(leg), len(leg.effort_limits))
-    gravity = np.asarray(contact.gravity)
-    check_directions("gravity", gravity)
-    check_normals(np.asarray(contact.normal), -gravity)
+    check_directions("gravity", np.asarray(contact.gravity))
+    check_directions("load_direction", np.asarray(contact.load_direction))
+    check_normals(np.asarray(contact.normal), np.asarray(contact.load_direction))
     for name in ("friction", "load", "any_direction_moment"):
         as_non_negative(name, getattr(contact, name))
     for name in ("load", "moment", "any_direction_moment", "bias_efforts", "gravity"):

@@ -24,7 +24,14 @@ from leg_statics.stance.stances import (
     payload,
 )
 from leg_statics.stance.standing import BodyPose, robot_stance
-from leg_statics.step_length import CommonStep, Criterion, StepLength, common_step, longest_step
+from leg_statics.step_length import (
+    CommonStep,
+    Criterion,
+    GroundProfile,
+    StepLength,
+    common_step,
+    longest_step,
+)
 from leg_statics.workspace import workspace_bounds
 
 __all__ = [
@@ -37,6 +44,7 @@ __all__ = [
     "Criterion",
     "Footholds",
     "Ground",
+    "GroundProfile",
     "Grounds",
     "IndexMap",
     "JointStream",

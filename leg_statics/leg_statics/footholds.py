@@ -81,7 +81,7 @@ class Footholds(NamedTuple):
 
     @property
     def load_capacity(self) -> FloatArray:
-        """Largest vertical force of the ground [N].
+        """Largest load, the part of the ground's force in its direction [N].
 
         Infinite if the structure alone carries any load, NaN without a posture, 0 if not even an
         unloaded foot can be held.
@@ -199,32 +199,37 @@ class Footholds(NamedTuple):
         return feasible[order]
 
 
-def evaluate_footholds(leg: Leg, foot_position: ArrayLike, contact: Contact) -> Footholds:
+def evaluate_footholds(
+    leg: Leg, foot_position: ArrayLike, contact: Contact, assembly_mode: str = ""
+) -> Footholds:
     """Evaluate foothold candidates.
 
     A candidate is feasible if the posture is OK and every load from zero, when the foot touches
     down, to the required one can be held within the effort limits by some force of the friction
-    cone, of which the load is the vertical part. The horizontal part is left to the other legs.
+    cone, of which the load is the part against gravity, or in the direction that the contact says.
+    The rest is left to the other legs.
 
     Args:
         leg: The leg; its foot must be a point in space.
         foot_position: Candidates in the leg frame (..., 3) [m].
         contact: Ground, required load and moment.
+        assembly_mode: Branch of the closed chain; "" is the default.
 
     Raises:
         KindError: If it is no leg or no contact.
+        UnknownNameError: If the leg has no such assembly mode.
         NotSupportedError: If the mechanism's end is no point foot.
         ShapeError: If shapes do not fit.
         ValueRangeError: If friction, load or moments are negative or NaN, or a normal is zero or
             points into the ground.
     """
     require("leg", leg, Leg)
-    posture, twist_jacobian = leg.mechanism.inverse_with_twist(foot_position)
+    posture, twist_jacobian = leg.mechanism.inverse_with_twist(foot_position, assembly_mode)
     return _judged(leg, posture, twist_jacobian, contact)
 
 
 def evaluate_around(
-    leg: Leg, foot_position: ArrayLike, contact: Contact, radius: float
+    leg: Leg, foot_position: ArrayLike, contact: Contact, radius: float, assembly_mode: str = ""
 ) -> Footholds:
     """Evaluate candidates of which the foot may miss each by a distance, in any direction.
 
@@ -236,15 +241,18 @@ def evaluate_around(
         foot_position: Candidates in the leg frame (..., 3) [m].
         contact: Ground, required load and moment.
         radius: How far from a candidate the foot may come down [m].
+        assembly_mode: Branch of the closed chain; "" is the default.
 
     Raises:
+        UnknownNameError: If the leg has no such assembly mode.
         NotSupportedError: If the mechanism's end is no point foot.
         ShapeError: If shapes do not fit.
         ValueRangeError: If a value is out of range.
     """
     size = float(as_non_negative("radius", radius))
     feet = as_array("foot_position", foot_position, 3)
-    found = evaluate_footholds(leg, feet[..., None, :] + size * AROUND, contact.spread())
+    around = feet[..., None, :] + size * AROUND
+    found = evaluate_footholds(leg, around, contact.spread(), assembly_mode)
     fails = ~found.feasible
     first = np.argmax(fails, axis=-1)[..., None]  # the candidate itself comes first
     verdict = np.take_along_axis(found.verdict, first, axis=-1)[..., 0]

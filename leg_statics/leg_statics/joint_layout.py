@@ -13,7 +13,6 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.mirrored import without_reflection
 from leg_kinematics.robot import Drives, Leg, Robot
-from leg_statics.weight import level_gravity
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,8 @@ class LegGroup:
         signs: Signs of the components of vectors, which tell mirrored legs (L, 3).
         lower: Least efforts (L, n) [N.m or N].
         upper: Greatest efforts (L, n) [N.m or N].
-        gravity: Gravity of a level body in the frames of the legs, reflected if they are (L, 3).
+        turns: Matrices that turn vectors of the legs' frames, reflected if they are, into the base
+            frame (L, 3, 3).
         drives: What their drives tell, for all legs (L, n); None for the joint positions.
     """
 
@@ -37,8 +37,13 @@ class LegGroup:
     signs: FloatArray
     lower: FloatArray
     upper: FloatArray
-    gravity: FloatArray
+    turns: FloatArray
     drives: Drives | None = None
+
+    def from_base(self, vectors: FloatArray) -> FloatArray:
+        """Return free vectors (..., 3) of the base frame in the frame of each leg (..., L, 3)."""
+        x, y, z = np.moveaxis(vectors, -1, 0)[..., None, None]
+        return self.turns[:, 0] * x + self.turns[:, 1] * y + self.turns[:, 2] * z
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ def _leg_group(mechanism: Mechanism, legs: Sequence[Leg], column: dict[str, int]
         signs=signs,
         lower=np.ascontiguousarray(limits[..., 0]),
         upper=np.ascontiguousarray(limits[..., 1]),
-        gravity=signs * [level_gravity(leg) for leg in legs],
+        turns=np.array([leg.mount.rotation for leg in legs]) * signs[:, None, :],
         drives=_common_drives(legs),
     )
 

@@ -19,12 +19,14 @@ from numpy.typing import ArrayLike
 
 from leg_kinematics.arguments import as_names, require
 from leg_kinematics.arrays import FloatArray, as_array, as_non_negative
-from leg_kinematics.errors import LegError, ShapeError
+from leg_kinematics.errors import LegError, ShapeError, ValueRangeError
 from leg_kinematics.robot import Robot
 from leg_statics.capacity.problem import check_effort_limits
 from leg_statics.joint_layout import JointLayout, LegGroup, joint_layout
-from leg_statics.leg_state import LegStates, leg_states
+from leg_statics.leg_state import LegStates, Surroundings, leg_states
+from leg_statics.weight import LEVEL_GRAVITY
 
+CONTACT_FORCE = 10.0  # N
 KNOWN_LAYOUTS = 64  # kinds of joint state messages remembered
 
 
@@ -41,20 +43,19 @@ class JointStream:
     Args:
         robot: The robot, with the effort limits in force.
         friction: Friction coefficient of the ground for the load capacity.
+        contact_force: Force against gravity by which a foot is on the ground [N].
 
     Raises:
         KindError: If it is no robot.
-        ShapeError: If the friction is not one number.
-        ValueRangeError: If the friction is negative or NaN, or limits are NaN or reversed.
+        ShapeError: If friction or contact force are not one number.
+        ValueRangeError: If they are negative or NaN, or limits are NaN or reversed.
     """
 
-    def __init__(self, robot: Robot, friction: float) -> None:
+    def __init__(self, robot: Robot, friction: float, contact_force: float = CONTACT_FORCE) -> None:
         require("robot", robot, Robot)
         self.robot = robot
-        checked = as_non_negative("friction", friction)
-        if checked.ndim:
-            raise ShapeError(f"friction must be one number, got shape {checked.shape}")
-        self.friction = float(checked)
+        self.friction = _size("friction", friction)
+        self.contact_force = _size("contact_force", contact_force)
         _, limits = robot.effort_limits()
         check_effort_limits(limits[:, 0], limits[:, 1])
         self._layouts: dict[tuple[str, ...], JointLayout] = {}
@@ -88,6 +89,7 @@ class JointStream:
         position: ArrayLike,
         velocity: ArrayLike = (),
         effort: ArrayLike = (),
+        gravity: ArrayLike = LEVEL_GRAVITY,
     ) -> LegStates:
         """Return the states of all legs whose joints are named, in the order of the robot.
 
@@ -96,6 +98,7 @@ class JointStream:
             position: Joint positions (..., N) [rad or m].
             velocity: Joint velocities (..., N) [rad/s or m/s]; empty if not known.
             effort: Joint efforts (..., N) [N.m or N]; empty if not known.
+            gravity: Acceleration of gravity in the base frame (..., 3) [m/s²]; NaN if not known.
 
         Returns:
             States with the batch axes of the position; `legs` is empty if there is none to update.
@@ -103,24 +106,35 @@ class JointStream:
 
         Raises:
             JointStateError: If a name appears more than once or a length is wrong.
+            ShapeError: If gravity is no vector.
+            ValueRangeError: If gravity is zero or infinite.
         """
         names = _as_tuple(names)
         layout = self.layout(names)
         fields = joint_fields(len(names), position, velocity, effort)
-        parts = [self._group_states(group, *fields) for group in layout.groups]
+        down = as_array("gravity", gravity, 3)
+        if not down.any(axis=-1).all():
+            raise ValueRangeError("gravity must not be zero")
+        around = Surroundings(self.friction, self.contact_force, down)
+        parts = [self._group_states(group, around, *fields) for group in layout.groups]
         if len(parts) == 1:
             return parts[0]
         return _merged(parts, layout, fields[0].shape[:-1])
 
     def _group_states(
-        self, group: LegGroup, position: FloatArray, velocity: FloatArray, effort: FloatArray
+        self,
+        group: LegGroup,
+        around: Surroundings,
+        position: FloatArray,
+        velocity: FloatArray,
+        effort: FloatArray,
     ) -> LegStates:
         positions, rates = position[..., group.columns], _rows(velocity, group)
         efforts = _rows(effort, group)
         if group.drives is not None:
             positions = group.drives.positions(positions)
             rates, efforts = group.drives.velocities(rates), group.drives.efforts(efforts)
-        return leg_states(group, self.friction, positions, rates, efforts)
+        return leg_states(group, around, positions, rates, efforts)
 
 
 class StampOrder:
@@ -159,6 +173,19 @@ def joint_fields(
     ]
 
 
+def _size(name: str, value: float) -> float:
+    """Return one number that is not negative.
+
+    Raises:
+        ShapeError: If there are several.
+        ValueRangeError: If it is negative or NaN.
+    """
+    checked = as_non_negative(name, value)
+    if checked.ndim:
+        raise ShapeError(f"{name} must be one number, got shape {checked.shape}")
+    return float(checked)
+
+
 def _as_tuple(names: Sequence[str]) -> tuple[str, ...]:
     """Return names as a tuple; what is in a tuple is looked at when it is new."""
     return names if isinstance(names, tuple) else as_names("names", names)
@@ -176,13 +203,9 @@ def _field(name: str, values: ArrayLike, count: int, *, may_be_empty: bool) -> F
 
 def _merged(parts: Sequence[LegStates], layout: JointLayout, batch: tuple[int, ...]) -> LegStates:
     """Return the states of several groups, or of none, as one in the order of the robot."""
-    nothing = LegStates(
-        (),
-        (),
-        np.empty((*batch, 0), np.uint8),
-        *np.empty((2, *batch, 0, 3)),
-        *np.empty((5, *batch, 0)),
-    )
+    code, vector, number = ((), np.uint8), ((3,), np.float64), ((), np.float64)
+    fields = (code, *[vector] * 3, code, *[number] * 5)
+    nothing = LegStates((), (), *(np.empty((*batch, 0, *axes), kind) for axes, kind in fields))
     joints = [positions for part in parts for positions in part.joint_positions]
     arrays = (
         np.concatenate(fields, axis=len(batch)).take(layout.order, axis=len(batch))

@@ -4,6 +4,9 @@
 During stance the foot moves along a straight line relative to the body, at constant height. The
 smoother the ground, the shorter the part of that line on which the leg may bear its load; this is
 the use that paper 000 makes of the rated friction (section 3.3, figure 8).
+
+Over a `GroundProfile` the line follows the ground: the longest part of it is sought whose points
+are all feasible.
 """
 
 from __future__ import annotations
@@ -17,10 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from leg_kinematics.arguments import require
 from leg_kinematics.arrays import FloatArray, StatusArray, as_array
-from leg_kinematics.errors import NotSupportedError, ValueRangeError
+from leg_kinematics.errors import NotSupportedError, ShapeError, ValueRangeError
 from leg_kinematics.mechanism import Mechanism
 from leg_kinematics.robot import Leg
 from leg_kinematics.status import Status
+from leg_statics.capacity.problem import GRIP
 from leg_statics.footholds import Contact, Footholds, Verdict, evaluate_footholds
 from leg_statics.workspace import actuator_grid, check_heights
 
@@ -45,6 +49,50 @@ class Criterion(IntEnum):
     RATED_FRICTION = 1
 
 
+class GroundProfile(NamedTuple):
+    """Height of the ground along a line: linear between points, unknown elsewhere and next to NaN.
+
+    Attributes:
+        distance: Distances along the line from the origin of the leg frame, increasing (Q,) [m].
+        height: How high the ground is there, above the height of the line (Q,) [m].
+    """
+
+    distance: ArrayLike
+    height: ArrayLike
+
+    def rise(self, s: FloatArray) -> FloatArray:
+        """Return how high the ground is at distances s (...,); NaN where it is unknown [m]."""
+        distance, height = as_array("distance", self.distance), as_array("height", self.height)
+        return np.interp(s, distance, height, left=np.nan, right=np.nan)
+
+    def contact(self, contact: Contact, s: FloatArray) -> Contact:
+        """Return a contact whose friction (Q,) or normal (Q, 3) varies, at distances s (...,)."""
+        distance, s = as_array("distance", self.distance), np.nan_to_num(s)  # nowhere is no matter
+        friction, normal = as_array("friction", contact.friction), contact.normal
+        if friction.ndim:
+            friction = np.interp(s, distance, np.minimum(friction, GRIP))
+        if normal is not None and np.ndim(normal) > 1:
+            columns = np.moveaxis(as_array("normal", normal, 3), -1, 0)
+            normal = np.stack([np.interp(s, distance, column) for column in columns], axis=-1)
+        return contact._replace(friction=friction, normal=normal)
+
+    def check(self, contact: Contact) -> None:
+        """Raise an error unless distances increase and all else has a value, or one for all."""
+        distance = as_array("distance", self.distance)
+        if distance.ndim != 1 or len(distance) < 2:
+            raise ShapeError(f"distance must have shape (Q,) with Q >= 2, got {distance.shape}")
+        if not (np.isfinite(distance).all() and (np.diff(distance) > 0.0).all()):
+            raise ValueRangeError(f"distance must be finite and increase, got {distance.tolist()}")
+        for name, values, shapes in (
+            ("height", self.height, [distance.shape]),
+            ("friction", contact.friction, [(), distance.shape]),
+            ("normal", contact.normal, [(), (3,), (*distance.shape, 3)]),
+        ):
+            if np.shape(values) not in shapes:  # type: ignore[arg-type]
+                allowed = " or ".join(map(str, shapes))
+                raise ShapeError(f"{name} must have shape {allowed}, got {np.shape(values)}")  # type: ignore[arg-type]
+
+
 class StepLength(NamedTuple):
     """Longest feasible stance for each height (...,).
 
@@ -58,6 +106,7 @@ class StepLength(NamedTuple):
         load_capacity: Load capacity at these points (..., 21) [N].
         rated_friction: mu_e at these points (..., 21).
         rated_friction_full: Its full form at these points (..., 21).
+        weight_counted: Whether the actuators hold the leg's own weight, too.
     """
 
     length: FloatArray
@@ -69,6 +118,7 @@ class StepLength(NamedTuple):
     load_capacity: FloatArray
     rated_friction: FloatArray
     rated_friction_full: FloatArray
+    weight_counted: bool
 
 
 def longest_step(
@@ -79,6 +129,7 @@ def longest_step(
     lateral_offset: ArrayLike = 0.0,
     direction: ArrayLike = FORWARD,
     criterion: Criterion = Criterion.CAPACITY,
+    profile: GroundProfile | None = None,
 ) -> StepLength:
     """Find the longest straight stance on which every point is feasible.
 
@@ -90,10 +141,12 @@ def longest_step(
     Args:
         leg: The leg; its foot must be a point in space.
         height: z of the foot in the leg frame (...,) [m], negative below the hip.
-        contact: Ground, required load and moment, the same for all points.
+        contact: Ground, required load and moment, the same for all points; with a profile, friction
+            (Q,) and normal (Q, 3) may be those at its points.
         lateral_offset: Distance of the line from the leg frame's origin (...,) [m].
         direction: Walking direction, horizontal (3,) of any length.
         criterion: What makes a point feasible.
+        profile: Height of the ground along the line; None = level.
 
     Returns:
         The step for each height, its ends to 0.1 mm and better, and what limits them.
@@ -108,7 +161,7 @@ def longest_step(
     require("leg", leg, Leg)
     along = _horizontal_unit(direction)
     axes = np.stack([along, _left_of(along), np.array([0.0, 0.0, 1.0])])
-    return _longest_stance(leg, axes, height, lateral_offset, contact, criterion)
+    return _longest_stance(leg, axes, height, lateral_offset, contact, criterion, profile)
 
 
 def _longest_stance(
@@ -118,22 +171,32 @@ def _longest_stance(
     lateral_offset: ArrayLike,
     contact: Contact,
     criterion: Criterion,
+    profile: GroundProfile | None,
 ) -> StepLength:
     """Find the longest stance along the first of three axes (3, 3), whose third is upwards."""
     along, left, up = axes
     heights, offsets = np.broadcast_arrays(
         _finite("height", height), _finite("lateral_offset", lateral_offset)
     )
-    check_heights(leg.mechanism, heights, up)
+    if profile is None:
+        check_heights(leg.mechanism, heights, up)
+    else:
+        profile.check(contact)
     _check_criterion(leg.mechanism, criterion)
     batch = heights.shape
     origins = offsets.reshape(-1, 1) * left + heights.reshape(-1, 1) * up
     lines, reach = np.arange(len(origins)), _reach(leg.mechanism)
 
+    def place(s: FloatArray, line: NDArray[np.intp] = lines) -> FloatArray:
+        """Return the points of the ground at distances s along lines."""
+        points = origins[line] + s[..., None] * along
+        return points if profile is None else points + profile.rise(s)[..., None] * up
+
     def evaluate(line: NDArray[np.intp], s: FloatArray) -> tuple[StatusArray, Footholds]:
         """Return verdict and footholds at distances s along lines."""
-        footholds = evaluate_footholds(leg, origins[line] + s[..., None] * along, contact)
-        return _verdicts(footholds, contact, criterion), footholds
+        ground = contact if profile is None else profile.contact(contact, s)
+        footholds = evaluate_footholds(leg, place(s, line), ground)
+        return _verdicts(footholds, ground, criterion), footholds
 
     def is_feasible(line: NDArray[np.intp], s: FloatArray) -> NDArray[np.bool_]:
         return np.asarray(evaluate(line, s)[0] == Verdict.FEASIBLE)
@@ -153,14 +216,15 @@ def _longest_stance(
     _, footholds = evaluate(lines[:, None], start[:, None] + (end - start)[:, None] * share)
     return StepLength(
         length=np.nan_to_num(end - start).reshape(batch),
-        start=(origins + start[:, None] * along).reshape(*batch, 3),
-        end=(origins + end[:, None] * along).reshape(*batch, 3),
+        start=place(start).reshape(*batch, 3),
+        end=place(end).reshape(*batch, 3),
         start_limit=limits[0].reshape(batch),
         end_limit=limits[1].reshape(batch),
         positions=footholds.posture.foot_position.reshape(*batch, PROFILE_POINTS, 3),
         load_capacity=footholds.load_capacity.reshape(*batch, PROFILE_POINTS),
         rated_friction=footholds.rated_friction.reshape(*batch, PROFILE_POINTS),
         rated_friction_full=footholds.rated_friction_full.reshape(*batch, PROFILE_POINTS),
+        weight_counted=footholds.weight_counted,
     )
 
 
@@ -232,6 +296,7 @@ def common_step(
     lateral_offset: Callable[[Leg], float] | float = 0.0,
     direction: ArrayLike = FORWARD,
     criterion: Criterion = Criterion.CAPACITY,
+    profiles: Mapping[str, GroundProfile] | None = None,
 ) -> CommonStep:
     """Find the step that all given legs can make at once.
 
@@ -243,6 +308,7 @@ def common_step(
             of the leg.
         direction: Walking direction in the base frame, horizontal (3,).
         criterion: What makes a point feasible.
+        profiles: Height of the ground along the line of each leg, by name; None = level.
     """
     require("legs", legs, Mapping)
     require("contact", contact, Contact)
@@ -261,6 +327,7 @@ def common_step(
             lateral_offset(leg) if callable(lateral_offset) else lateral_offset,
             contact.turned(mount.vectors_to_leg),
             criterion,
+            None if profiles is None else profiles[name],
         )
     lengths = np.stack([step.length for step in steps.values()], axis=-1)
     return CommonStep(np.min(lengths, axis=-1), np.argmin(lengths, axis=-1), steps)

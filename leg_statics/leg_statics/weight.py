@@ -20,7 +20,12 @@ LEVEL_GRAVITY = (0.0, 0.0, -GRAVITY)  # in the frame of a level body
 
 def level_gravity(leg: Leg) -> tuple[float, float, float]:
     """Return gravity in the frame of a leg whose body is level [m/s²]."""
-    x, y, z = leg.mount.vertical
+    return gravity_below(leg.mount.vertical)
+
+
+def gravity_below(vertical: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return gravity where a unit vector points upwards [m/s²]."""
+    x, y, z = vertical
     return -GRAVITY * x, -GRAVITY * y, -GRAVITY * z
 
 

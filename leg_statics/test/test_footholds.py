@@ -489,9 +489,10 @@ def test_a_batch_equals_its_points_one_by_one_whatever_its_size(count):
         any_direction_moment=random.uniform(0.0, 2.0, count),
         bias_efforts=random.uniform(-3.0, 3.0, (count, 3)),
         gravity=random.normal(size=(count, 3)) - np.array([0.0, 0.0, 6.0]),
+        load_direction=random.normal(size=(count, 3)) + np.array([0.0, 0.0, 6.0]),
     )
-    steep = np.sum(contact.normal * contact.gravity, axis=1) >= 0.0
-    contact.normal[steep] = -contact.gravity[steep]
+    steep = np.sum(contact.normal * contact.load_direction, axis=1) <= 0.0
+    contact.normal[steep] = contact.load_direction[steep]
     together = evaluate_footholds(LEG, feet, contact)
     for k in range(count):
         alone = evaluate_footholds(LEG, feet[k], Contact(*(field[k] for field in contact)))

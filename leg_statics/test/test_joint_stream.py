@@ -16,6 +16,8 @@ from leg_statics.efforts import utilisation
 from leg_statics.footholds import Contact, evaluate_footholds
 from leg_statics.indices import evaluate_indices, supported_indices
 from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStateError, JointStream, StampOrder
+from leg_statics.leg_state import ContactState
+from leg_statics.weight import weight_efforts
 
 FRICTION = 0.4
 SAME = {"rtol": 1e-12, "atol": 1e-12}
@@ -52,6 +54,48 @@ def test_load_capacity_of_a_tilted_leg_is_vertical_on_level_ground():
         ok = states.status[:, k] == Status.OK
         found = evaluate_footholds(leg, states.foot_position[ok, k], Contact(FRICTION))
         np.testing.assert_allclose(states.load_capacity[ok, k], found.load_capacity, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "solo12"])
+def test_loads_count_against_the_gravity_of_each_moment(name):
+    robot = load_robot(name)
+    position, velocity, effort = random_joint_states(robot, 40)
+    gravity = np.random.default_rng(2).normal(size=(40, 3)) - [0.0, 0.0, 9.0]
+    gravity[7] = np.nan
+    stream, names = JointStream(robot, FRICTION), joint_names(robot)
+    states = stream.read(names, position, velocity, effort, gravity)
+    assert np.isnan(states.load_capacity[7]).all()
+    assert not states.contact[7].any()
+    level = stream.read(names, position, velocity, effort)
+    np.testing.assert_array_equal(states.status, level.status)
+    for k, leg in enumerate(robot.legs.values()):
+        ok = (states.status[:, k] == Status.OK) & np.isfinite(gravity[:, 0])
+        own = leg.mount.vectors_to_leg(gravity[ok])
+        found = evaluate_footholds(leg, states.foot_position[ok, k], Contact(FRICTION, gravity=own))
+        np.testing.assert_allclose(states.load_capacity[ok, k], found.load_capacity, rtol=1e-5)
+        one = stream.read(names, position[3], velocity[3], effort[3], gravity[3])
+        np.testing.assert_array_equal(one.ground_force[k], states.ground_force[3, k])
+
+
+@pytest.mark.parametrize("name", ["hexapod", "solo12"])
+def test_the_efforts_that_hold_a_force_tell_that_force_and_contact(name):
+    robot, rng = load_robot(name), np.random.default_rng(4)
+    names, gravity = joint_names(robot), np.array([1.0, -0.5, -9.6])
+    for leg in robot.legs.values():
+        posture = leg.mechanism.initial_posture
+        force = rng.normal(size=(30, 3)) * 20.0
+        own = leg.mount.vectors_to_leg(gravity)
+        jacobian = leg.mechanism.jacobian(posture)
+        efforts = weight_efforts(leg.mechanism, posture, own) - force @ jacobian
+        position, effort = np.zeros((30, len(names))), np.zeros((30, len(names)))
+        columns = [names.index(joint) for joint in leg.joint_names]
+        position[:, columns], effort[:, columns] = posture.joint_positions, efforts
+        states = JointStream(robot, FRICTION).read(names, position, (), effort, gravity)
+        k = states.legs.index(leg.name)
+        np.testing.assert_allclose(states.ground_force[:, k], force, atol=1e-9)
+        load = -force @ own / np.linalg.norm(own)
+        wanted = np.where(load >= 10.0, ContactState.ON_THE_GROUND, ContactState.IN_THE_AIR)
+        np.testing.assert_array_equal(states.contact[:, k], wanted)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "quadruped", "walker"])

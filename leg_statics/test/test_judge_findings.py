@@ -85,10 +85,9 @@ def test_what_is_beyond_a_limit_is_counted_and_what_is_at_it_is_not():
 
 def test_a_foot_in_the_air_bears_nothing_and_one_without_a_wrench_might():
     findings = Findings(load_robot("hexapod"), 0.4, contact_force=10.0)
-    force = np.full((4, 3), np.nan)
-    force[:3, 2] = [100.0, 0.0, 9.9]
+    load = np.array([100.0, 0.0, 9.9, np.nan])
     capacity = np.array([500.0, 50.0, 60.0, 400.0])
-    findings.add([judgement("left_front", np.arange(4), force=force, load_capacity=capacity)])
+    findings.add([judgement("left_front", np.arange(4), load=load, load_capacity=capacity)])
     quantity = next(q for q in findings.quantities if q.name == "load_capacity")
     extent = findings.extent("left_front", quantity)
     assert (extent.known, extent.least) == (2, 400.0)

@@ -11,7 +11,7 @@ import pytest
 from leg_kinematics import Leg, Mirrored, Status, load_robot
 from leg_statics import Contact, common_step, evaluate_footholds, load_capacity, longest_step
 from leg_statics.joint_layout import joint_layout
-from leg_statics.leg_state import leg_states
+from leg_statics.leg_state import Surroundings, leg_states
 from leg_statics.weight import LEVEL_GRAVITY, level_gravity, weight_efforts
 
 ROBOT = load_robot("solo12")
@@ -67,7 +67,8 @@ def test_states_and_steps_bear_the_weight():
     posture = LEG.mechanism.inverse(FEET)
     (group,) = joint_layout(ROBOT, LEG.joint_names).groups
     unknown = np.full((len(FEET), 1, 3), np.nan)
-    states = leg_states(group, 0.5, posture.joint_positions[:, None], unknown, unknown)
+    around = Surroundings(0.5, 10.0, np.array(LEVEL_GRAVITY))
+    states = leg_states(group, around, posture.joint_positions[:, None], unknown, unknown)
     bias = LEG.mechanism.holding_efforts(posture, LEVEL_GRAVITY)
     wanted = load_capacity(
         LEG.mechanism.jacobian(posture), *LEG.effort_limits.T, 0.5, bias_efforts=bias

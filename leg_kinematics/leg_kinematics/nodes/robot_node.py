@@ -36,7 +36,8 @@ from leg_kinematics.nodes.node_log import LibraryLog, NodeLog
 from leg_kinematics.nodes.requests import RequestError, error_code
 from leg_kinematics.nodes.robot_folders import find_allowed_robot
 from leg_kinematics.nodes.service import Service
-from leg_kinematics.robot import Robot
+from leg_kinematics.nodes.transforms import Transforms
+from leg_kinematics.robot import Mount, Robot
 from leg_kinematics.warm_up import warm_up_kinematics
 
 # The default depth of 10 loses requests when many clients ask at once.
@@ -90,6 +91,14 @@ class RobotNode(Node):
         self.declare_number(
             "max_points", 1_000_000, "Points accepted in one request.", (1, 10_000_000)
         )
+        self.declare_number(
+            "transform_age",
+            1.0,
+            "How old the latest transform of tf may be in answers to requests without a stamp [s].",
+            (0.0, 3600.0),
+            read_only=True,
+        )
+        self.transforms = Transforms(self, self.value("transform_age"))
         self.declare_number(
             "diagnostics_rate", 1.0, "Rate of /diagnostics [Hz].", (0.1, 100.0), read_only=True
         )
@@ -151,6 +160,14 @@ class RobotNode(Node):
         """Points accepted in one request."""
         points: int = self.value("max_points")
         return points
+
+    def base_pose(self, frame_id: str, stamp: Any) -> Mount:
+        """Return where the base frame is in a frame that is none of the robot's, as tf tells.
+
+        Raises:
+            RequestError: If it is not known.
+        """
+        return self.transforms.base_pose(self.robot, frame_id, stamp)
 
     def _check_parameters(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for parameter in parameters:

@@ -14,17 +14,13 @@ from leg_msgs.msg import ErrorCode
 from leg_msgs_py.arrays import from_field
 from leg_msgs_py.naming import interface_name
 
+from leg_kinematics.nodes.frames import Whereabouts
 from leg_kinematics.nodes.requests import error_code
-from leg_kinematics.robot import Robot
 from leg_kinematics.status import Status
 
 
-class Host(Protocol):
-    """What answers requests about a robot: a node, or whoever answers as it does."""
-
-    @property
-    def robot(self) -> Robot:
-        """The robot, with the effort limits in force."""
+class Host(Whereabouts, Protocol):
+    """What answers requests about a robot, with the effort limits in force: a node, or its like."""
 
     @property
     def max_points(self) -> int:

@@ -5,6 +5,7 @@ A module for each family of questions says what is asked, what is answered, and 
 """
 
 from leg_msgs_py.client.leg_client import SERVICES, LegClient
+from leg_msgs_py.frames import Frame
 from leg_msgs_py.grounds import Ground
 
-__all__ = ["SERVICES", "Ground", "LegClient"]
+__all__ = ["SERVICES", "Frame", "Ground", "LegClient"]

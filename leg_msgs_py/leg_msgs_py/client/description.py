@@ -51,6 +51,7 @@ class LegDescription(NamedTuple):
         excursion_names: Names of the excursions of passive joints that are limited (e).
         excursion_units: Their units (e).
         excursion_limits: Least and greatest excursion (e, 2) [rad or m].
+        weight_counted: Whether the leg's own weight counts: whether a model tells its masses.
         task_coordinates: Names of the foot's coordinates (t).
         task_units: Their units (t).
         assembly_modes: Names of the branches of the closed chain; the first is the default.
@@ -80,6 +81,7 @@ class LegDescription(NamedTuple):
     excursion_names: tuple[str, ...]
     excursion_units: tuple[str, ...]
     excursion_limits: FloatArray
+    weight_counted: bool
     task_coordinates: tuple[str, ...]
     task_units: tuple[str, ...]
     assembly_modes: tuple[str, ...]
@@ -120,6 +122,7 @@ class LegDescription(NamedTuple):
             excursion_names=tuple(message.excursion_names),
             excursion_units=tuple(message.excursion_units),
             excursion_limits=pairs(message.excursion_lower, message.excursion_upper),
+            weight_counted=message.weight_counted,
             task_coordinates=tuple(message.task_coordinates),
             task_units=tuple(message.task_units),
             assembly_modes=tuple(message.assembly_modes),

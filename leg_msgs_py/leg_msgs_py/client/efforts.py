@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from leg_msgs.srv import ComputeEfforts
 from leg_msgs_py.arrays import FloatArray, StatusArray, from_field, to_field
-from leg_msgs_py.client.inputs import points, vectors
+from leg_msgs_py.client.inputs import points, vector, vectors
 from leg_msgs_py.client.questions import Request, question
+from leg_msgs_py.frames import Frame, put_frame
 from numpy.typing import ArrayLike, NDArray
 
 
@@ -22,6 +23,7 @@ class Efforts(NamedTuple):
         limiting_joint: Index of the joint with that utilisation (...,); -1 where there is none.
         status: Status of each point (...,).
         joint_names: Names of the actuated joints (n).
+        weight_counted: Whether the efforts hold the leg's own weight, too.
     """
 
     joint_efforts: FloatArray
@@ -29,6 +31,7 @@ class Efforts(NamedTuple):
     limiting_joint: NDArray[np.int32]
     status: StatusArray
     joint_names: tuple[str, ...]
+    weight_counted: bool
 
 
 @question("statics", ComputeEfforts)
@@ -38,7 +41,8 @@ def compute_efforts(
     forces: ArrayLike,
     moments: ArrayLike | None = None,
     *,
-    frame: str = "",
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    frame: Frame | str = "",
     assembly_mode: str = "",
 ) -> Request[Efforts]:
     """Return the joint efforts that hold what the ground applies to the foot.
@@ -48,7 +52,9 @@ def compute_efforts(
         positions: Foot (..., t) [m].
         forces: Force of the ground on the foot (..., 3), or one for all (3,) [N].
         moments: Moment of the ground on the foot, likewise [N.m]; None for hard ground.
-        frame: Frame of all three: the leg's own ("" or its name) or the base frame.
+        gravity: Acceleration of gravity in the frame (3,) [m/s²]; zero is down the frame, or down
+            the base frame if it is the leg's own.
+        frame: Frame of all three: the leg's own ("" or its name), the base frame, or a `Frame`.
         assembly_mode: Branch of the closed chain; "" is the default.
     """
     feet = points("positions", positions)
@@ -57,9 +63,10 @@ def compute_efforts(
         positions=to_field(feet.values),
         assembly_mode=assembly_mode,
         forces=to_field(vectors("forces", forces, feet.batch)),
+        gravity=vector("gravity", gravity),
         moments=to_field([] if moments is None else vectors("moments", moments, feet.batch)),
     )
-    request.header.frame_id = frame
+    put_frame(request, frame)
 
     def decode(response: Any) -> Efforts:
         status = feet.status(response)
@@ -70,6 +77,7 @@ def compute_efforts(
             limiting_joint=from_field(response.limiting_joint, feet.batch, np.int32),
             status=status,
             joint_names=names,
+            weight_counted=response.weight_counted,
         )
 
     return Request(request, decode, feet)

@@ -10,6 +10,7 @@ from leg_msgs.srv import EvaluateIndices
 from leg_msgs_py.arrays import FloatArray, StatusArray, from_field, to_field
 from leg_msgs_py.client.inputs import points
 from leg_msgs_py.client.questions import Request, question
+from leg_msgs_py.frames import Frame, put_frame
 from numpy.typing import ArrayLike
 
 
@@ -37,7 +38,7 @@ def evaluate_indices(
     positions: ArrayLike,
     names: Sequence[str] = (),
     *,
-    frame: str = "",
+    frame: Frame | str = "",
     assembly_mode: str = "",
 ) -> Request[Indices]:
     """Return performance indices at foot positions.
@@ -46,14 +47,14 @@ def evaluate_indices(
         leg: Name of the leg; "" if the robot has exactly one.
         positions: Foot (..., t) [m].
         names: Names of the indices; none for all that the leg has.
-        frame: Frame of the positions: the leg's own ("" or its name) or the base frame.
+        frame: Frame of the positions: the leg's own ("" or its name), the base frame, or a `Frame`.
         assembly_mode: Branch of the closed chain; "" is the default.
     """
     feet = points("positions", positions)
     request = EvaluateIndices.Request(
         leg=leg, positions=to_field(feet.values), assembly_mode=assembly_mode, names=list(names)
     )
-    request.header.frame_id = frame
+    put_frame(request, frame)
 
     def decode(response: Any) -> Indices:
         status = feet.status(response)

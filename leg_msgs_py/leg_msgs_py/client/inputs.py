@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from leg_msgs_py.arrays import FloatArray, StatusArray, from_field
 from leg_msgs_py.errors import InvalidInputError, TooLargeError
+from leg_msgs_py.grounds import one_or_each
 from numpy.typing import ArrayLike
 
 
@@ -96,6 +97,18 @@ def vector(field: str, value: ArrayLike) -> FloatArray:
     if array.shape != (3,):
         raise InvalidInputError(f"{field} must have shape (3,), got {array.shape}")
     return array
+
+
+def rows(field: str, values: ArrayLike, batch: tuple[int, ...], *trailing: int) -> Any:
+    """Return a field with one value for all points, or one for each.
+
+    Raises:
+        InvalidInputError: If the values do not fit the points.
+    """
+    try:
+        return one_or_each(numbers(field, values), batch, *trailing)
+    except ValueError as error:
+        raise InvalidInputError(f"{field}: {error}") from None
 
 
 def vectors(field: str, values: ArrayLike, batch: tuple[int, ...]) -> FloatArray:

@@ -10,6 +10,7 @@ from leg_msgs_py.arrays import FloatArray, StatusArray, from_field, to_field
 from leg_msgs_py.client.inputs import points
 from leg_msgs_py.client.questions import Request, question
 from leg_msgs_py.errors import InvalidInputError
+from leg_msgs_py.frames import Frame, put_frame
 from numpy.typing import ArrayLike
 
 
@@ -70,21 +71,21 @@ class Jacobians(NamedTuple):
 
 @question("kinematics", ForwardKinematics)
 def forward_kinematics(
-    leg: str, joint_positions: ArrayLike, *, frame: str = "", assembly_mode: str = ""
+    leg: str, joint_positions: ArrayLike, *, frame: Frame | str = "", assembly_mode: str = ""
 ) -> Request[FootPositions]:
     """Return where the foot is.
 
     Args:
         leg: Name of the leg; "" if the robot has exactly one.
         joint_positions: Actuated joints (..., n) [rad or m].
-        frame: Frame wanted: the leg's own ("" or its name) or the robot's base frame.
+        frame: Frame wanted: the leg's own ("" or its name), the base frame, or a `Frame`.
         assembly_mode: Branch of the closed chain; "" is the default.
     """
     joints = points("joint_positions", joint_positions)
     request = ForwardKinematics.Request(
         leg=leg, joint_positions=to_field(joints.values), assembly_mode=assembly_mode
     )
-    request.header.frame_id = frame
+    put_frame(request, frame)
 
     def decode(response: Any) -> FootPositions:
         status = joints.status(response)
@@ -101,7 +102,7 @@ def inverse_kinematics(
     leg: str,
     positions: ArrayLike,
     *,
-    frame: str = "",
+    frame: Frame | str = "",
     assembly_mode: str = "",
     passive_joints: bool = False,
 ) -> Request[JointPositions]:
@@ -110,7 +111,7 @@ def inverse_kinematics(
     Args:
         leg: Name of the leg; "" if the robot has exactly one.
         positions: Foot (..., t) [m].
-        frame: Frame of the positions: the leg's own ("" or its name) or the base frame.
+        frame: Frame of the positions: the leg's own ("" or its name), the base frame, or a `Frame`.
         assembly_mode: Branch of the closed chain; "" is the default, "ALL" is every one.
         passive_joints: Whether to return the passive joints and their excursions, too.
     """
@@ -121,7 +122,7 @@ def inverse_kinematics(
         assembly_mode=assembly_mode,
         include_passive_joints=passive_joints,
     )
-    request.header.frame_id = frame
+    put_frame(request, frame)
 
     def decode(response: Any) -> JointPositions:
         modes = tuple(response.assembly_modes)
@@ -150,7 +151,7 @@ def jacobian(
     positions: ArrayLike | None = None,
     *,
     joint_positions: ArrayLike | None = None,
-    frame: str = "",
+    frame: Frame | str = "",
     assembly_mode: str = "",
 ) -> Request[Jacobians]:
     """Return the Jacobians of poses given by foot positions or by joint positions.
@@ -159,7 +160,8 @@ def jacobian(
         leg: Name of the leg; "" if the robot has exactly one.
         positions: Foot (..., t) [m]; None if joint positions are given.
         joint_positions: Actuated joints (..., n) [rad or m]; None if positions are given.
-        frame: Frame of positions and Jacobians: the leg's own ("" or its name) or the base's.
+        frame: Frame of positions and Jacobians: the leg's own ("" or its name), the base frame, or
+            a `Frame`.
         assembly_mode: Branch of the closed chain; "" is the default.
     """
     if positions is not None and joint_positions is None:
@@ -171,7 +173,7 @@ def jacobian(
     request = GetJacobian.Request(
         leg=leg, assembly_mode=assembly_mode, **{poses.field: to_field(poses.values)}
     )
-    request.header.frame_id = frame
+    put_frame(request, frame)
 
     def decode(response: Any) -> Jacobians:
         status = poses.status(response)

@@ -66,6 +66,7 @@ class LegClient:
     compute_efforts = efforts.compute_efforts
 
     query_footholds = footholds.query_footholds
+    query_footholds_of_legs = footholds.query_footholds_of_legs
     query_step_length = steps.query_step_length
 
     index_map = maps.index_map

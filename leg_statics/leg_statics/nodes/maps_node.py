@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from leg_msgs.action import ComputeIndexMap
-from leg_msgs.msg import EffortLimits
-from leg_msgs_py.arrays import from_field, to_field
+from leg_msgs_py.arrays import to_field
 from leg_msgs_py.clouds import to_cloud
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
@@ -24,12 +22,9 @@ from visualization_msgs.msg import MarkerArray
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, UnknownNameError
 from leg_kinematics.mechanism import Posture
+from leg_kinematics.nodes.frames import LegFrame, robot_frame
 from leg_kinematics.nodes.node_process import run
-from leg_kinematics.nodes.requests import (
-    LegFrame,
-    RequestError,
-    find_frame,
-)
+from leg_kinematics.nodes.requests import RequestError
 from leg_kinematics.nodes.robot_node import RobotNode
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.status import Status
@@ -38,6 +33,7 @@ from leg_statics.map_jobs import MapJob, MapKey, MapMemory
 from leg_statics.maps import IndexMap, find_layer, supported_layers
 from leg_statics.nodes.contacts import declare_grounds
 from leg_statics.nodes.goal_queue import GoalQueue
+from leg_statics.nodes.limits_in_force import LATCHED, LimitsInForce
 from leg_statics.nodes.markers import (
     Scene,
     deletion,
@@ -49,9 +45,6 @@ from leg_statics.nodes.markers import (
 from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.maps import map_key
 from leg_statics.warm_up import warm_up_statics
-
-LIMITS_TYPE = "leg_msgs/msg/EffortLimits"
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True)
@@ -104,7 +97,7 @@ class MapsNode(RobotNode):
         self._declare_parameters()
         self.grounds = declare_grounds(self)
         self._memory = MapMemory(int(1e6 * self.value("map_memory")))
-        self._limits: Any = None
+        self._limits = LimitsInForce(self, "maps", self._take_up_limits)
         self._postures: dict[str, Posture] = {}
         self._workspaces: list[Any] = []
         self._drawn_at = -np.inf
@@ -112,9 +105,6 @@ class MapsNode(RobotNode):
         self._moved: dict[str, float] = {}  # positions of joints since the legs were drawn
         self._map_publisher = self.create_publisher(PointCloud2, "~/index_map", LATCHED)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/markers", LATCHED)
-        self._limits_subscription = self.create_subscription(
-            EffortLimits, "statics/effort_limits", self.effort_limits, LATCHED
-        )
         self.listen(JointState, "joint_states", self.joint_states)
         self.add_post_set_parameters_callback(lambda parameters: self._draw())
         self.robot_changed()
@@ -160,51 +150,18 @@ class MapsNode(RobotNode):
     def robot_changed(self) -> None:
         """Begin anew: all legs in their initial posture, with the limits in force."""
         self._postures = {leg.name: leg.mechanism.initial_posture for leg in self._legs()}
-        self._apply_limits()
-        self._draw()
+        self._take_up_limits()
 
     def _legs(self) -> list[Leg]:
         return list(self.robot.legs.values())
 
-    # ------------------------------------------------------------------ effort limits
-
     def look_around(self) -> None:
-        """Note if no node tells the limits in force, as when the statics node has another name."""
-        note, topic = "effort limits", self._limits_subscription.topic_name
-        self.health.notes.pop(note, None)
-        if self._limits_subscription.get_publisher_count():
-            return
-        told = [name for name, types in self.get_topic_names_and_types() if LIMITS_TYPE in types]
-        elsewhere = [name for name in told if self.count_publishers(name)]
-        self.health.notes[note] = (
-            f"no node publishes {topic}: maps have the limits last heard of, or else the robot "
-            "description's"
-            + (f"; remap statics/effort_limits to {' or '.join(elsewhere)}" if elsewhere else "")
-        )
-
-    def effort_limits(self, message: Any) -> None:
-        """Take up the effort limits in force."""
-        self._limits = message
-        self._attend("effort_limits", self._take_up_limits)
+        """Note if no node tells the limits in force."""
+        self._limits.look_around()
 
     def _take_up_limits(self) -> None:
-        self._apply_limits()
+        self.robot = self._limits.of(self.robot)
         self._draw()
-
-    def _apply_limits(self) -> None:
-        """Give the legs the limits last heard of, if they are those of this robot."""
-        message = self._limits
-        if message is None or not set(message.joint_names) >= set(self.robot.effort_limits()[0]):
-            return
-        rows = np.stack([from_field(message.lower), from_field(message.upper)], axis=-1)
-        limits = dict(zip(message.joint_names, rows, strict=True))
-        legs = {
-            leg.name: replace(
-                leg, effort_limits=np.array([limits[joint] for joint in leg.joint_names])
-            )
-            for leg in self._legs()
-        }
-        self.robot = replace(self.robot, legs=legs)
 
     # ------------------------------------------------------------------ maps
 
@@ -227,7 +184,7 @@ class MapsNode(RobotNode):
     def publish_map(self, leg: Leg, index_map: IndexMap) -> None:
         """Publish a map in the base frame, without a time: who comes later shows it there, too."""
         base = self.robot.base_frame
-        cloud = self.cloud(base, find_frame(self.robot, leg, base), index_map)
+        cloud = self.cloud(base, robot_frame(self.robot, leg, base), index_map)
         cloud.header = Header(frame_id=base)
         self._map_publisher.publish(cloud)
 
@@ -240,7 +197,7 @@ class MapsNode(RobotNode):
             LegError: If it cannot be computed.
         """
         leg = self.robot.leg(request.leg)
-        frame = find_frame(self.robot, leg, request.header.frame_id)
+        frame = robot_frame(self.robot, leg, request.header.frame_id)
         key = map_key(self, leg, request, frame, None)
         unknown = set(request.layers) - set(supported_layers(leg.mechanism))
         if unknown:
@@ -311,14 +268,6 @@ class MapsNode(RobotNode):
         gone = [deletion(header, name) for name in sorted(self._shown - names)]
         self._marker_publisher.publish(MarkerArray(markers=[*gone, *markers]))
         self._drawn_at = time.monotonic()  # drawing takes long: the node rests after it
-
-    def _attend(self, source: str, work: Any) -> None:
-        """Do the work of a callback; a fault of it is recorded."""
-        with self.health.timed():
-            try:
-                work()
-            except Exception as error:
-                self.failure(source, error)
 
 
 def main() -> int:

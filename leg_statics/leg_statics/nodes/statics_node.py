@@ -4,22 +4,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
+import numpy as np
 from leg_msgs.msg import EffortLimits, LegState, LegStates
 from leg_msgs_py.arrays import from_field, to_field
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from leg_kinematics.arrays import FloatArray
 from leg_kinematics.nodes.node_process import run
 from leg_kinematics.nodes.robot_node import STREAM_QOS, RobotNode
 from leg_kinematics.robot import Robot
 from leg_statics.joint_layout import JointLayout
 from leg_statics.joint_pieces import JointPieces
-from leg_statics.joint_stream import KNOWN_LAYOUTS, JointStream, StampOrder
+from leg_statics.joint_stream import CONTACT_FORCE, KNOWN_LAYOUTS, JointStream, StampOrder
 from leg_statics.leg_state import LegStates as States
+from leg_statics.leg_state import vectors_in_base
+from leg_statics.nodes.attitude import Attitude
 from leg_statics.nodes.contacts import declare_grounds
 from leg_statics.nodes.rate_limit import RateLimit
 from leg_statics.nodes.services import SERVICES
@@ -41,6 +45,13 @@ class StaticsNode(RobotNode):
             "Friction coefficient of the ground for the load capacity in ~/leg_states.",
             (0.0, 10.0),
         )
+        self.declare_number(
+            "contact_force",
+            CONTACT_FORCE,
+            "Force against gravity by which a foot in ~/leg_states is on the ground [N].",
+            (0.0, 1e6),
+        )
+        self._attitude = Attitude(self)
         self.declare_number(
             "state_rate_limit", 0.0, "Greatest rate of ~/leg_states [Hz]; 0 = no limit.", (0.0, 1e4)
         )
@@ -112,19 +123,21 @@ class StaticsNode(RobotNode):
         self._note_missing(names, layout, missing)
         if not self._limit.allows(time.monotonic(), names):
             return
-        states = self._stream.read(names, position, velocity, effort)
+        gravity = self._attitude.gravity()
+        states = self._stream.read(names, position, velocity, effort, gravity)
         if not states.legs:
             return
-        filled = self._states_message(states)
+        filled = self._states_message(states, gravity)
         filled.header.stamp = stamp
         self._states_publisher.publish(filled)
 
     def _renew_stream(self) -> None:
         """Take up the robot, its limits and the parameters of the stream."""
-        self._stream = JointStream(self.robot, self.value("friction_coefficient"))
+        friction, contact = self.value("friction_coefficient"), self.value("contact_force")
+        self._stream = JointStream(self.robot, friction, contact)
         self._limit.rate = self.value("state_rate_limit")
         self._pieces = JointPieces(self.robot)
-        self._messages: dict[tuple[str, ...], LegStates] = {}
+        self._messages: dict[tuple[str, ...], _Filling] = {}
 
     def _note_missing(
         self, names: tuple[str, ...], layout: JointLayout, missing: Mapping[str, tuple[str, ...]]
@@ -147,23 +160,23 @@ class StaticsNode(RobotNode):
             self.health.notes[f"leg not updated: {leg}"] = text
             self.log.warning(f"{leg} not updated", text)
 
-    def _states_message(self, states: States) -> LegStates:
+    def _states_message(self, states: States, gravity: FloatArray) -> LegStates:
         """Return the message of leg states; it is filled anew each time, since making one is dear.
 
         A publisher is done with a message when `publish` returns.
         """
         if states.legs not in self._messages:
-            self._messages[states.legs] = LegStates(
-                header=Header(frame_id=self.robot.base_frame),
-                legs=[LegState(leg=leg) for leg in states.legs],
-            )
-        message = self._messages[states.legs]
+            self._messages[states.legs] = _Filling.of(self.robot, states.legs)
+        message, rotation, position = self._messages[states.legs]
+        _fill_vector(message.gravity, gravity.tolist())
         rows = zip(
             message.legs,
             states.joint_positions,
             states.status.tolist(),
-            states.foot_position,
-            states.foot_velocity,
+            (vectors_in_base(rotation, states.foot_position) + position).tolist(),
+            vectors_in_base(rotation, states.foot_velocity).tolist(),
+            vectors_in_base(rotation, states.ground_force).tolist(),
+            states.contact.tolist(),
             states.condition_number.tolist(),
             states.load_capacity.tolist(),
             states.rated_friction.tolist(),
@@ -171,17 +184,44 @@ class StaticsNode(RobotNode):
             states.utilisation.tolist(),
             strict=True,
         )
-        for leg, joints, status, foot, velocity, condition, capacity, mu_e, mu_full, used in rows:
+        for leg, joints, status, foot, velocity, force, contact, *numbers in rows:
             leg.joint_positions = to_field(joints)
             leg.status = status
-            leg.foot_position = foot
-            leg.foot_velocity = velocity
-            leg.condition_number = condition
-            leg.load_capacity = capacity
-            leg.rated_friction = mu_e
-            leg.rated_friction_full = mu_full
-            leg.utilisation = used
+            _fill_vector(leg.foot_position, foot)
+            _fill_vector(leg.foot_velocity, velocity)
+            _fill_vector(leg.ground_force, force)
+            leg.contact = contact
+            (
+                leg.condition_number,
+                leg.load_capacity,
+                leg.rated_friction,
+                leg.rated_friction_full,
+                leg.utilisation,
+            ) = numbers
         return message
+
+
+class _Filling(NamedTuple):
+    """A message of leg states to fill, and the mounts of its legs."""
+
+    message: LegStates
+    rotation: FloatArray
+    position: FloatArray
+
+    @classmethod
+    def of(cls, robot: Robot, names: tuple[str, ...]) -> _Filling:
+        """Return the filling of some legs of a robot."""
+        message = LegStates(
+            header=Header(frame_id=robot.base_frame), legs=[LegState(leg=name) for name in names]
+        )
+        mounts = [robot.legs[name].mount for name in names]
+        rotation = np.array([mount.rotation for mount in mounts])
+        return cls(message, rotation, np.array([mount.position for mount in mounts]))
+
+
+def _fill_vector(message: Any, numbers: Sequence[float]) -> None:
+    """Fill a message with fields x, y, z."""
+    message.x, message.y, message.z = numbers
 
 
 def main() -> int:

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import LegError, ValueRangeError
 from leg_kinematics.mechanism import Posture
-from leg_kinematics.nodes.requests import find_frame
+from leg_kinematics.nodes.frames import robot_frame
 from leg_kinematics.robot import Leg, Robot
 from leg_kinematics.status import Status
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.joint_pieces import JointPieces, WholeLegs
-from leg_statics.joint_stream import JointStateError, JointStream, StampOrder
+from leg_statics.joint_stream import CONTACT_FORCE, JointStateError, JointStream, StampOrder
 from leg_statics.leg_state import LegStates
 from leg_statics.weight import level_gravity, weight_efforts
 
@@ -91,6 +91,8 @@ class Judgement(NamedTuple):
         status: `Status` of the poses (T,).
         foot_position: (T, 3) [m], in the leg frame as all vectors here.
         foot_velocity: (T, 3) [m/s].
+        ground_force: Force of the ground that balances the joint efforts (T, 3) [N].
+        contact: `ContactState` that it tells (T,).
         condition_number: (T,).
         load_capacity: (T,) [N].
         rated_friction: mu_e (T,).
@@ -101,7 +103,8 @@ class Judgement(NamedTuple):
             actuated joint has gone (T,).
         passive_range_use: Largest share of its excursion limit that a passive joint uses (T,).
         force: Ground reaction on the foot (T, 3) [N].
-        load_share: Vertical ground reaction / load capacity (T,).
+        load: Its component along z of the base frame (T,) [N].
+        load_share: load / load capacity (T,).
         friction_used: Horizontal / vertical ground reaction (T,).
         required_utilisation: Share of the effort limit that the wrench needs of every joint (T, n).
     """
@@ -114,6 +117,8 @@ class Judgement(NamedTuple):
     status: NDArray[np.uint8]
     foot_position: FloatArray
     foot_velocity: FloatArray
+    ground_force: FloatArray
+    contact: NDArray[np.uint8]
     condition_number: FloatArray
     load_capacity: FloatArray
     rated_friction: FloatArray
@@ -123,6 +128,7 @@ class Judgement(NamedTuple):
     range_use: FloatArray
     passive_range_use: FloatArray
     force: FloatArray
+    load: FloatArray
     load_share: FloatArray
     friction_used: FloatArray
     required_utilisation: FloatArray
@@ -206,7 +212,7 @@ class BagJudge:
         robot: Robot,
         friction: float,
         topics: Topics,
-        contact_force: float = 10.0,
+        contact_force: float = CONTACT_FORCE,
         gap: float = 0.1,
     ) -> None:
         self.robot = robot
@@ -216,7 +222,7 @@ class BagJudge:
         self.tally = Tally()
         self._bag = bag
         self._friction = friction
-        self._stream = JointStream(robot, friction)
+        self._stream = JointStream(robot, friction, contact_force)
         self._pieces = JointPieces(robot)
         self._order = StampOrder()
         self._contact_force = contact_force
@@ -328,7 +334,7 @@ class BagJudge:
     def _take_wrench(self, message: BagMessage) -> None:
         leg = self._legs_by_topic[message.topic]
         stamped = self._bag.decode(message)
-        frame = find_frame(self.robot, leg, stamped.header.frame_id)
+        frame = robot_frame(self.robot, leg, stamped.header.frame_id)
         parts = stamped.wrench.force, stamped.wrench.torque
         vectors = np.array([[part.x, part.y, part.z] for part in parts])
         self._wrenches[leg.name] = (message.time, frame.vectors_to_leg(vectors))
@@ -350,7 +356,8 @@ class BagJudge:
             legs[name] = replace(leg, effort_limits=rows)
         robot = replace(self.robot, legs=legs)
         if not np.array_equal(robot.effort_limits()[1], self.robot.effort_limits()[1]):
-            stream = JointStream(robot, self._friction)  # refuses limits that make no sense
+            # refuses limits that make no sense
+            stream = JointStream(robot, self._friction, self._contact_force)
             self._judged = self.judge()
             self.robot, self._stream = robot, stream
             self.tally.limit_changes += 1
@@ -394,9 +401,10 @@ class BagJudge:
             wrench = np.stack([np.broadcast_to(r.wrenches[leg.name], (2, 3)) for r in rows])
             force = wrench[:, 0]
             required = _required_utilisation(leg, posture, force, wrench[:, 1])
-        touches = force[:, 2] >= self._contact_force
+        load = leg.mount.vectors_to_base(force)[:, 2]
+        touches = load >= self._contact_force
         with np.errstate(divide="ignore", invalid="ignore"):
-            load_share = force[:, 2] / states.load_capacity[:, k]
+            load_share = load / states.load_capacity[:, k]
             slope = np.hypot(force[:, 0], force[:, 1]) / force[:, 2]
         return Judgement(
             leg=leg.name,
@@ -407,6 +415,8 @@ class BagJudge:
             status=states.status[:, k],
             foot_position=states.foot_position[:, k],
             foot_velocity=states.foot_velocity[:, k],
+            ground_force=states.ground_force[:, k],
+            contact=states.contact[:, k],
             condition_number=states.condition_number[:, k],
             load_capacity=states.load_capacity[:, k],
             rated_friction=states.rated_friction[:, k],
@@ -416,6 +426,7 @@ class BagJudge:
             range_use=_range_use(positions, mechanism.joint_limits),
             passive_range_use=utilisation(excursions, mechanism.passive_joint_limits)[0],
             force=force,
+            load=load,
             load_share=load_share,
             friction_used=np.where(touches, slope, np.nan),
             required_utilisation=required,

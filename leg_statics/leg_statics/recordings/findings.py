@@ -166,7 +166,7 @@ class Findings:
 
     def _in_air(self, judgement: Judgement) -> NDArray[np.bool_]:
         """Tell where the wrench tells that the foot is in the air (T,)."""
-        return np.asarray(judgement.force[:, 2] < self.contact_force)
+        return np.asarray(judgement.load < self.contact_force)
 
     def _values(self, judgement: Judgement, quantity: Quantity) -> FloatArray:
         """Return the values of a quantity that count, NaN for the others (T,)."""
@@ -206,7 +206,7 @@ class Findings:
         """Return the values to draw by name."""
         curves = {quantity.name: self._values(judgement, quantity) for quantity in self.quantities}
         curves[NOT_OK] = np.where(judgement.status == Status.OK, np.nan, 1.0)
-        curves["force_z"] = judgement.force[:, 2]
+        curves["force_z"] = judgement.load
         for k, joint in enumerate(self._joints[judgement.leg]):
             curves[f"joint_utilisation {joint}"] = judgement.joint_utilisation[:, k]
             curves[f"required_utilisation {joint}"] = judgement.required_utilisation[:, k]

@@ -13,9 +13,11 @@ from leg_msgs_py.recordings.bag_types import installed_types
 from leg_msgs_py.recordings.bag_writer import BagWriter, offered_qos
 from leg_msgs_py.recordings.bags import Bag, BagMessage
 
+from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot
 from leg_statics.recordings.bag_judge import Judgement
+from leg_statics.weight import LEVEL_GRAVITY
 
 LEG_STATES = "leg_msgs/msg/LegStates"
 MOST_WAITING = 64 * 2**20  # of copied messages until the states between them are known [B]
@@ -84,21 +86,33 @@ class JudgedBag:
         types = self._types.types
         stamp = types["builtin_interfaces/msg/Time"](*divmod(int(judgement.stamp[k]), 10**9))
         header = types["std_msgs/msg/Header"](stamp, self._robot.base_frame)
-        return types[LEG_STATES](header, [self._leg_state(*row) for row in rows])
+        gravity = self._vector("Vector3", np.array(LEVEL_GRAVITY))
+        return types[LEG_STATES](header, gravity, [self._leg_state(*row) for row in rows])
 
     def _leg_state(self, judgement: Judgement, k: int) -> Any:
+        mount = self._robot.leg(judgement.leg).mount
+        velocity, force = (
+            self._vector("Vector3", mount.vectors_to_base(vectors[k]))
+            for vectors in (judgement.foot_velocity, judgement.ground_force)
+        )
         return self._types.types["leg_msgs/msg/LegState"](
             leg=judgement.leg,
             status=int(judgement.status[k]),
             joint_positions=np.ascontiguousarray(judgement.joint_positions[k]),
-            foot_position=judgement.foot_position[k],
-            foot_velocity=judgement.foot_velocity[k],
+            foot_position=self._vector("Point", mount.to_base(judgement.foot_position[k])),
+            foot_velocity=velocity,
+            ground_force=force,
+            contact=int(judgement.contact[k]),
             condition_number=float(judgement.condition_number[k]),
             load_capacity=float(judgement.load_capacity[k]),
             rated_friction=float(judgement.rated_friction[k]),
             rated_friction_full=float(judgement.rated_friction_full[k]),
             utilisation=float(judgement.utilisation[k]),
         )
+
+    def _vector(self, kind: str, numbers: FloatArray) -> Any:
+        """Return a message of geometry_msgs with x, y, z."""
+        return self._types.types[f"geometry_msgs/msg/{kind}"](*numbers.tolist())
 
     def __enter__(self) -> JudgedBag:
         self._writer.__enter__()

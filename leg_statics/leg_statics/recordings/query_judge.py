@@ -24,9 +24,10 @@ from leg_msgs_py.recordings.comparison import Difference, Tolerance, differences
 from leg_msgs_py.recordings.definitions import message_definition
 
 from leg_kinematics.errors import ValueRangeError
+from leg_kinematics.nodes.frames import no_transforms
 from leg_kinematics.nodes.service import Service, Summary
 from leg_kinematics.nodes.services import SERVICES as KINEMATICS
-from leg_kinematics.robot import Leg, Robot
+from leg_kinematics.robot import Leg, Mount, Robot
 from leg_statics.grounds import Grounds
 from leg_statics.map_jobs import MapKey, MapMemory
 from leg_statics.maps import IndexMap
@@ -57,6 +58,10 @@ class _Answerer(NamedTuple):
     grounds: Grounds
     max_points: int = sys.maxsize
     max_steps: int = sys.maxsize
+
+    def base_pose(self, frame_id: str, stamp: Any) -> Mount:
+        """Raise a RequestError: what tf told the node is not known."""
+        raise no_transforms(self.robot, frame_id, "tf of a recording is not read")
 
     def plane(self, leg: Leg, key: MapKey) -> IndexMap:
         """Return the map of a plane."""
@@ -110,6 +115,7 @@ class QueryJudge:
         services: Services whose events they are, by name.
         without_contents: Requests of which only the metadata were recorded.
         without_request: Responses whose request was not recorded.
+        without_transform: Requests that the node answered with what tf told, which is not judged.
 
     Raises:
         ValueRangeError: If a topic has another type of messages, or one of another version.
@@ -133,6 +139,7 @@ class QueryJudge:
         self.services = {service.name: service for service in self._services.values()}
         self.without_contents = 0
         self.without_request = 0
+        self.without_transform = 0
         self._forgotten = 0
         self._bag = bag
         self._grounds = grounds
@@ -178,6 +185,10 @@ class QueryJudge:
                 self.without_request += 1
                 return
             request = self._waiting.pop(key)
+            refused = event.response[0].error.code != ErrorCode.SUCCESS
+            if not refused and _asks_tf(request.content, robot):
+                self.without_transform += 1
+                return
             seconds = (nanoseconds - request.stamp) / 1e9
             service = self._services[message.topic]
             query = self._query(service, robot, request, event.response[0], seconds)
@@ -224,6 +235,14 @@ def _event_topics(node: str) -> dict[str, Service]:
     }
 
 
+def _asks_tf(request: Any, robot: Robot) -> bool:
+    """Tell whether a request is in a frame of which it does not tell where the robot is."""
+    if not hasattr(request, "base_pose") or len(request.base_pose):
+        return False
+    own = {"", robot.base_frame, *(leg.frame for leg in robot.legs.values())}
+    return request.header.frame_id not in own
+
+
 def _legs(request: Any) -> str:
     """Return the legs that a request names, separated by blanks."""
     return " ".join(request.legs) if hasattr(request, "legs") else str(request.leg)
@@ -251,6 +270,8 @@ def _copy(recorded: Any, message: Any) -> None:
             _copy(value, place)
         elif isinstance(place, array.array):
             setattr(message, name, to_field(value, value.dtype))
+        elif isinstance(value, np.ndarray) and isinstance(place, list):  # booleans
+            setattr(message, name, value.tolist())
         else:
             setattr(message, name, value)
 

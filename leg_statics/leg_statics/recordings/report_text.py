@@ -280,6 +280,7 @@ def _queries(case: Case, clock: _Clock) -> list[str]:
         (judge.unanswered, "requests without a recorded response are not judged."),
         (judge.without_request, "responses without a recorded request are not judged."),
         (judge.without_contents, "requests were recorded without their contents."),
+        (judge.without_transform, "answers took a pose from tf, which is not read: not judged."),
     ):
         if count:
             lines.append(f"{count} {what}")

@@ -20,6 +20,7 @@ from leg_kinematics.errors import ValueRangeError
 from leg_kinematics.robot import Robot
 from leg_kinematics.status import Status
 from leg_statics.footholds import Verdict
+from leg_statics.leg_state import ContactState
 from leg_statics.recordings.bag_judge import Judgement
 from leg_statics.recordings.query_judge import Query
 
@@ -49,13 +50,15 @@ PLAIN = (
     Column("utilisation", "1", "share of its effort limit that the worst joint uses"),
     Column("range_use", "1", "share of its range, from the middle, that the worst joint uses"),
     Column("passive_range_use", "1", "share of its excursion that the worst passive joint uses"),
-    Column("load_share", "1", "vertical ground reaction / load capacity"),
+    Column("load", "N", "vertical component of the ground reaction"),
+    Column("load_share", "1", "load / load capacity"),
     Column("friction_used", "1", "horizontal / vertical ground reaction"),
 )
 VECTORS = (
     Column("foot_position", "m", "foot in the leg frame"),
     Column("foot_velocity", "m/s", "velocity of the foot in the leg frame"),
     Column("force", "N", "ground reaction on the foot in the leg frame"),
+    Column("ground_force", "N", "what the joint efforts tell of it, in the leg frame"),
 )
 JOINTS = (
     Column("joint_positions", "rad or m", "position"),
@@ -94,12 +97,14 @@ class JudgeTable:
     def _rows(self, judgement: Judgement) -> pa.Table:
         count = len(judgement.time)
         status = np.array([status.name for status in Status])[judgement.status]
+        contact = np.array([state.name for state in ContactState])[judgement.contact]
         values: dict[str, Any] = {
             "message": judgement.message,
             "time": judgement.time,
             "stamp": judgement.stamp,
             "leg": np.full(count, judgement.leg),
             "status": status,
+            "contact": contact,
             **{column.name: getattr(judgement, column.name) for column in PLAIN},
         }
         for column in VECTORS:
@@ -202,6 +207,7 @@ def _schema(robot: Robot) -> pa.Schema:
             _field("stamp", pa.int64(), "ns", "its stamp"),
             _field("leg", pa.string(), "", "name of the leg"),
             _field("status", pa.string(), "", "status of the pose, of leg_msgs/PointStatus"),
+            _field("contact", pa.string(), "", "what ground_force tells, of leg_msgs/LegState"),
             *(_field(column.name, pa.float64(), column.unit, column.doc) for column in numbers),
         ]
     )

@@ -10,13 +10,11 @@ from leg_msgs.srv import ForwardKinematics, GetJacobian, InverseKinematics
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.conditioning import condition_number
+from leg_kinematics.nodes.frames import find_frame, read_feet, read_posture
 from leg_kinematics.nodes.requests import (
     RequestError,
     check_count,
-    find_frame,
-    read_feet,
     read_joints,
-    read_posture,
 )
 from leg_kinematics.nodes.service import Host, service
 
@@ -27,7 +25,7 @@ ALL_MODES = "ALL"
 def forward_kinematics(host: Host, request: Any, response: Any) -> None:
     """Fill the foot positions of joint positions."""
     leg = host.robot.leg(request.leg)
-    frame = find_frame(host.robot, leg, request.header.frame_id)
+    frame = find_frame(host, leg, request)
     joints = read_joints(leg, request, host.max_points)
     posture = leg.mechanism.forward(joints, request.assembly_mode)
     response.header.frame_id = request.header.frame_id
@@ -42,7 +40,7 @@ def inverse_kinematics(host: Host, request: Any, response: Any) -> None:
     mechanism = leg.mechanism
     every_mode = request.assembly_mode == ALL_MODES
     modes = mechanism.assembly_modes if every_mode else [request.assembly_mode]
-    frame = find_frame(host.robot, leg, request.header.frame_id)
+    frame = find_frame(host, leg, request)
     feet = read_feet(leg, request, frame)
     check_count("positions", len(modes) * len(feet), host.max_points)
     postures = [mechanism.inverse(feet, mode) for mode in modes]
@@ -64,7 +62,7 @@ def get_jacobian(host: Host, request: Any, response: Any) -> None:
     """Fill the Jacobians of poses given by joint or foot positions."""
     leg = host.robot.leg(request.leg)
     mechanism = leg.mechanism
-    frame = find_frame(host.robot, leg, request.header.frame_id)
+    frame = find_frame(host, leg, request)
     if len(request.joint_positions) and len(request.positions):
         raise RequestError(
             f"joint_positions and positions are both given ({len(request.joint_positions)} and "

@@ -61,6 +61,7 @@ def description_message(robot: Robot, leg: Leg) -> Any:
         excursion_units=[excursion.unit for excursion in mechanism.excursions],
         excursion_lower=to_field(mechanism.passive_joint_limits[:, 0]),
         excursion_upper=to_field(mechanism.passive_joint_limits[:, 1]),
+        weight_counted=mechanism.has_masses,
         task_coordinates=list(mechanism.task_coordinates),
         task_units=list(mechanism.task_units),
         assembly_modes=list(mechanism.assembly_modes),

@@ -10,25 +10,20 @@ from leg_msgs.srv import ComputeEfforts
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.arrays import FloatArray
-from leg_kinematics.nodes.requests import (
-    XYZ,
-    RequestError,
-    find_frame,
-    read_posture,
-    read_rows,
-)
+from leg_kinematics.nodes.frames import find_frame, read_posture
+from leg_kinematics.nodes.requests import XYZ, RequestError, read_rows
 from leg_kinematics.nodes.service import Host, service
 from leg_kinematics.status import Status
 from leg_statics.efforts import joint_efforts, utilisation
-from leg_statics.nodes.contacts import standing_leg
-from leg_statics.weight import level_gravity, weight_efforts
+from leg_statics.nodes.contacts import gravity_in_leg, standing_leg
+from leg_statics.weight import weight_efforts
 
 
 @service(ComputeEfforts)
 def compute_efforts(host: Host, request: Any, response: Any) -> None:
     """Fill the joint efforts that hold ground reactions."""
     leg = standing_leg(host.robot, request.leg)
-    frame = find_frame(host.robot, leg, request.header.frame_id)
+    frame = find_frame(host, leg, request)
     posture = read_posture(leg, request, frame, host.max_points)
     count = len(posture.status)
     forces = frame.vectors_to_leg(_vectors("forces", request.forces, count))
@@ -36,7 +31,8 @@ def compute_efforts(host: Host, request: Any, response: Any) -> None:
     moments = request.moments if len(request.moments) else no_moment
     moments = frame.vectors_to_leg(_vectors("moments", moments, count))
     mechanism = leg.mechanism
-    efforts = weight_efforts(mechanism, posture, level_gravity(leg)) + joint_efforts(
+    weight = weight_efforts(mechanism, posture, gravity_in_leg(frame, request))
+    efforts = weight + joint_efforts(
         mechanism.jacobian(posture), mechanism.angular_jacobian(posture), forces, moments
     )
     status = posture.status.copy()
@@ -48,6 +44,7 @@ def compute_efforts(host: Host, request: Any, response: Any) -> None:
     response.utilisation = to_field(used)
     response.limiting_joint = to_field(limiting_joint, np.int32)
     response.status = to_field(status, np.uint8)
+    response.weight_counted = mechanism.has_masses
 
 
 def _vectors(field: str, values: Any, count: int) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from leg_msgs.srv import EvaluateIndices
 from leg_msgs_py.arrays import to_field
 
-from leg_kinematics.nodes.requests import find_frame, read_posture
+from leg_kinematics.nodes.frames import find_frame, read_posture
 from leg_kinematics.nodes.service import Host, service
 from leg_statics.indices import INDICES
 from leg_statics.indices import evaluate_indices as indices_at
@@ -19,7 +19,7 @@ from leg_statics.indices import evaluate_indices as indices_at
 def evaluate_indices(host: Host, request: Any, response: Any) -> None:
     """Fill indices at foot positions."""
     leg = host.robot.leg(request.leg)
-    frame = find_frame(host.robot, leg, request.header.frame_id)
+    frame = find_frame(host, leg, request)
     posture = read_posture(leg, request, frame, host.max_points)
     names, values = indices_at(leg.mechanism, posture, request.names)
     response.names = list(names)

@@ -10,7 +10,8 @@ from leg_msgs.srv import GetIndexMap
 from leg_msgs_py.arrays import to_field
 
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.nodes.requests import LegFrame, check_count
+from leg_kinematics.nodes.frames import LegFrame
+from leg_kinematics.nodes.requests import check_count
 from leg_kinematics.nodes.service import service
 from leg_kinematics.robot import Leg
 from leg_statics.map_jobs import MapKey
@@ -23,7 +24,8 @@ from leg_statics.nodes.hosts import GroundsHost, MapsHost
 def get_index_map(host: MapsHost, request: Any, response: Any) -> None:
     """Fill the map of a plane."""
     leg = host.robot.leg(request.leg)
-    plane = host.plane(leg, map_key(host, leg, request, LegFrame(), request.height))
+    frame = LegFrame(leg.mount.vertical)
+    plane = host.plane(leg, map_key(host, leg, request, frame, request.height))
     response.header.frame_id = leg.frame
     response.ny, response.nx = plane.status.shape
     response.x0, response.y0 = float(plane.x[0]), float(plane.y[0])

@@ -12,27 +12,23 @@ import numpy as np
 from leg_msgs.srv import QueryStepLength
 from leg_msgs_py.arrays import from_field, to_field
 
-from leg_kinematics.arrays import FloatArray
 from leg_kinematics.errors import NotSupportedError
-from leg_kinematics.nodes.requests import (
-    BaseFrame,
-    LegFrame,
-    RequestError,
-    check_count,
-    find_frame,
-)
+from leg_kinematics.nodes.frames import OuterFrame, find_base, find_frame
+from leg_kinematics.nodes.requests import RequestError, check_count
 from leg_kinematics.nodes.service import Summary, service
-from leg_kinematics.robot import Leg, Mount, Robot
-from leg_statics.nodes.contacts import read_contact
+from leg_kinematics.robot import BASE, Leg
+from leg_statics.contact import Contact
+from leg_statics.nodes.contacts import finite, magnitude, read_gravity, read_grounds
 from leg_statics.nodes.hosts import StepsHost
 from leg_statics.step_length import (
     FORWARD,
     PROFILE_POINTS,
     CommonStep,
     Criterion,
+    GroundProfile,
     common_step,
 )
-from leg_statics.weight import LEVEL_GRAVITY, level_gravity
+from leg_statics.weight import LEVEL_GRAVITY, gravity_below
 
 
 def _summary(response: Any) -> Summary:
@@ -45,65 +41,105 @@ def _summary(response: Any) -> Summary:
 def query_step_length(host: StepsHost, request: Any, response: Any) -> None:
     """Fill the longest steps of legs, each and together."""
     robot = host.robot
-    names = list(request.legs) or list(robot.legs)
-    legs = [robot.leg(name) for name in names]
-    on_body = _on_body(robot, legs, request.header.frame_id)
-    gravity = LEVEL_GRAVITY if on_body else level_gravity(legs[0])
-    if not on_body:
-        legs = [replace(legs[0], mount=Mount(np.zeros(3), np.eye(3)))]
-    heights = _finite("heights", request.heights)
+    given = [robot.leg(name) for name in list(request.legs) or list(robot.legs)]
+    _check_legs(given)
+    legs, down = _placed(host, given, request)
+    heights = finite("heights", request.heights)
     check_count("legs and heights", len(legs) * len(heights), host.max_steps, "max_steps")
-    contact = read_contact(host.grounds, request, LegFrame()).under(gravity)
+    profiles = _profiles(request, legs)
+    contact = _contact(host, request)
     offsets = _lateral_offsets(request, legs)
-    direction = _finite("direction", request.direction)
+    direction = finite("direction", request.direction)
     if not direction.any():
         direction = np.array(FORWARD)
     common = common_step(
         {leg.name: leg for leg in legs},
         -heights,
-        contact,
+        contact.under(down if contact.gravity is None else contact.gravity),
         lateral_offset=lambda leg: offsets[leg.name],
         direction=direction,
         criterion=_criterion(request),
+        profiles=profiles,
     )
     response.header.frame_id = request.header.frame_id
     _fill(response, legs, common)
-    response.friction_coefficient = float(np.asarray(contact.friction))
+    response.friction_coefficients = to_field(contact.friction)
 
 
-def _on_body(robot: Robot, legs: Sequence[Leg], frame_id: str) -> bool:
-    """Tell whether a request for a step length is in the base frame, not in that of its only leg.
-
-    Raises:
-        RequestError: If a leg is named twice, or these legs do not share the frame.
-        NotSupportedError: If a leg has no point foot.
-    """
+def _check_legs(legs: Sequence[Leg]) -> None:
+    """Raise an error if a leg is named twice or has no point foot."""
     names = [leg.name for leg in legs]
     for leg in legs:
         if not leg.mechanism.has_point_foot:
             raise NotSupportedError(f"legs: {leg.name!r} has no point foot with x, y, z")
         if names.count(leg.name) > 1:
             raise RequestError(f"legs: {leg.name!r} is given twice; allowed: once each")
-    if len(legs) == 1 and not isinstance(find_frame(robot, legs[0], frame_id), BaseFrame):
-        return False
-    if frame_id not in ("", robot.base_frame):
+
+
+def _placed(
+    host: StepsHost, legs: Sequence[Leg], request: Any
+) -> tuple[list[Leg], tuple[float, ...]]:
+    """Return the legs as they stand in the frame of a request, and gravity if it tells none.
+
+    Raises:
+        RequestError: If these legs do not share the frame, or it is not known.
+    """
+    if len(legs) == 1:
+        frame = find_frame(host, legs[0], request)
+        mount = frame.mount if isinstance(frame, OuterFrame) else BASE
+        down = LEVEL_GRAVITY if mount is not BASE else gravity_below(frame.vertical)
+        return [replace(legs[0], mount=mount)], down
+    base = find_base(host, request)
+    return [replace(leg, mount=leg.mount.within(base)) for leg in legs], LEVEL_GRAVITY
+
+
+def _contact(host: StepsHost, request: Any) -> Contact:
+    """Return the contact of a request in its frame, along its profile if it has one.
+
+    Raises:
+        UnknownNameError: If it names an unknown ground.
+        RequestError: If a value is out of range.
+    """
+    friction, normal = read_grounds(
+        host.grounds, request.ground, len(request.profile_distances) or 1
+    )
+    moment = finite("required_moment", request.required_moment)
+    return Contact(
+        friction,
+        normal,
+        magnitude("required_load", request.required_load, "N"),
+        tuple(moment.tolist()),
+        magnitude("any_direction_moment", request.any_direction_moment, "N.m"),
+        gravity=read_gravity(request),
+    )
+
+
+def _profiles(request: Any, legs: Sequence[Leg]) -> dict[str, GroundProfile] | None:
+    """Return the ground along the line of each leg; None if it is level.
+
+    Raises:
+        RequestError: If there are too few or too many numbers, or distances do not increase.
+    """
+    distances = finite("profile_distances", request.profile_distances)
+    count, given = len(distances), len(request.profile_heights)
+    if count and (count < 2 or not (np.diff(distances) > 0.0).all()):
         raise RequestError(
-            f"header.frame_id: got {frame_id!r}; allowed for several legs: '' or "
-            f"{robot.base_frame!r}"
+            f"profile_distances: got {distances.tolist()[:10]}; allowed: none, or 2 and more that "
+            "increase"
         )
-    return True
-
-
-def _finite(field: str, values: Any) -> FloatArray:
-    array: FloatArray = from_field(values)
-    if not np.isfinite(array).all():
-        bad = array[~np.isfinite(array)][0]
-        raise RequestError(f"{field}: got {bad}; allowed: finite values")
-    return array
+    if given not in (count, count * len(legs)):
+        raise RequestError(
+            f"profile_heights: got {given} values; allowed: {count} (one a distance)"
+            + (f", or {count * len(legs)} (for each of {len(legs)} legs)" if len(legs) > 1 else "")
+        )
+    if not count:
+        return None
+    rows = np.broadcast_to(from_field(request.profile_heights, (-1, count)), (len(legs), count))
+    return {leg.name: GroundProfile(distances, row) for leg, row in zip(legs, rows, strict=True)}
 
 
 def _lateral_offsets(request: Any, legs: Sequence[Leg]) -> dict[str, float]:
-    offsets = _finite("lateral_offsets", request.lateral_offsets)
+    offsets = finite("lateral_offsets", request.lateral_offsets)
     if len(offsets) not in (0, 1, len(legs)):
         raise RequestError(
             f"lateral_offsets: got {len(offsets)} values; allowed: none, 1, or {len(legs)} (one a "
@@ -137,3 +173,4 @@ def _fill(response: Any, legs: Sequence[Leg], common: CommonStep) -> None:
     response.common_length = to_field(common.common_length)
     response.limiting_leg = to_field(common.limiting_leg, np.int32)
     response.best_height = common.best_height
+    response.weight_counted = [step.weight_counted for step in steps]
