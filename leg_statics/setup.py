@@ -28,6 +28,7 @@ setup(
             "plot_index_map = leg_statics.commands.plot_index_map:main",
             "search_geometry = leg_statics.commands.search_geometry:main",
             "synthesize_six_bar = leg_statics.commands.synthesize_six_bar:main",
+            "terrain_node = leg_statics.nodes.entry_points:terrain_node",
             "statics_node = leg_statics.nodes.entry_points:statics_node",
             "viewer = leg_statics.commands.viewer:main",
             "viewer_node = leg_statics.nodes.entry_points:viewer_node",

@@ -522,7 +522,8 @@ def test_the_launch_file_is_valid_and_starts_the_same_nodes():
     assert "nodes.yaml" in ast.unparse(tree)
     known = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")
     assert tuple(node["name"] for node in known["nodes"]) == node_names()
-    assert [node["name"] for node in known["companions"]] == ["designs", "gait", "viewer"]
+    companions = [node["name"] for node in known["companions"]]
+    assert companions == ["designs", "gait", "viewer", "terrain"]
     for node in (*known["nodes"], *known["companions"]):
         package, executable = node["package"], node["executable"]
         setup = (ROOT / package / "setup.py").read_text()

@@ -6,6 +6,7 @@
 - hexapod_tripod: six legs in two tripods, with efforts, foot wrenches and diagnostics.
 - quadruped_trot: four legs with cylinders in two diagonals, with efforts.
 - hexapod_faults: the hexapod's walk with all that goes wrong on a robot; see `FAULTS`.
+- rough_terrain: a height map as a point cloud with friction, and a body that goes over it.
 
 The same call makes the same messages. Joints are told in steps of an encoder, which hides the last
 bits that differ from one processor to the next, and packs well.
@@ -41,7 +42,14 @@ FORCE_STEP = 2.0**-4  # [N]
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-TYPES = installed_types([JOINT_STATE, WRENCH, DIAGNOSTICS])
+CLOUD = "sensor_msgs/msg/PointCloud2"
+POSE = "geometry_msgs/msg/PoseStamped"
+TYPES = installed_types([JOINT_STATE, WRENCH, DIAGNOSTICS, CLOUD, POSE])
+TERRAIN_STEP = 0.04  # spacing of the height map [m]
+# Place x, y, height and width of stones [m].
+STONES = np.random.default_rng(2).uniform(
+    [-0.5, -0.8, 0.01, 0.04], [0.85, 0.8, 0.06, 0.1], size=(60, 4)
+)
 
 
 @dataclass(frozen=True)
@@ -322,13 +330,72 @@ def faulty_records(sample: Sample) -> Iterator[Record]:
         yield record
 
 
+# --------------------------------------------------------------------------- terrain
+
+
+def rough_terrain() -> FloatArray:
+    """Return points of a strip of ground (N, 3) [m]: rubble, stairs, a slope and a gap.
+
+    Some are missing, as a camera does not see everything.
+    """
+    x, y = np.meshgrid(
+        np.arange(-0.6, 3.0, TERRAIN_STEP), np.arange(-0.8, 0.8 + TERRAIN_STEP, TERRAIN_STEP)
+    )
+    rubble = np.sum(
+        [
+            size * np.exp(-((x - a) ** 2 + (y - b) ** 2) / wide**2)
+            for a, b, size, wide in STONES.tolist()
+        ],
+        axis=0,
+    )
+    stairs = 0.08 * np.clip(np.floor((x - 0.9) / 0.3) + 1.0, 0.0, 3.0)
+    slope = -0.24 * np.clip((x - 1.8) / 0.8, 0.0, 1.0)
+    height = rubble + stairs + slope
+    points = np.stack([x, y, height], axis=-1).reshape(-1, 3)
+    gap = (points[:, 0] > 2.6) & (points[:, 0] < 2.75)
+    unseen = np.random.default_rng(5).random(len(points)) < 0.02
+    return _rounded(points[~gap & ~unseen], POSITION_STEP)
+
+
+def terrain_records() -> Iterator[Record]:
+    """Yield a height map and the poses of a body that goes over it."""
+    points = rough_terrain()
+    friction = np.where(np.abs(points[:, 1] + 0.4) < 0.15, 0.1, 0.5)  # a wet strip
+    yield Record("/terrain", START, _cloud(START, "map", points, friction))
+    for k in range(5):
+        stamp, angle = START + k * 10**9, 0.5 * 0.04 * k
+        pose = _new(
+            "geometry_msgs/msg/Pose",
+            _new("geometry_msgs/msg/Point", 0.15 * k, 0.0, 0.66 + 0.02 * k),
+            _new("geometry_msgs/msg/Quaternion", 0.0, -np.sin(angle), 0.0, np.cos(angle)),
+        )
+        yield Record("/base_pose", stamp + LATENCY, _new(POSE, _header(stamp, "map"), pose))
+
+
+def _cloud(stamp: int, frame: str, points: FloatArray, friction: FloatArray) -> Any:
+    """Return a sensor_msgs/PointCloud2 with the fields x, y, z and friction."""
+    table = np.column_stack([points, friction]).astype("<f4")
+    fields = [
+        _new("sensor_msgs/msg/PointField", name, 4 * k, 7, 1)
+        for k, name in enumerate(("x", "y", "z", "friction"))
+    ]
+    data = np.frombuffer(table.tobytes(), np.uint8)
+    size = len(points)
+    return _new(CLOUD, _header(stamp, frame), 1, size, fields, False, 16, 16 * size, data, True)
+
+
 # --------------------------------------------------------------------------- recordings
 
 
 def write_bag(path: Path, records: Sequence[Record]) -> None:
     """Write a recording; its topics are those of the records."""
     reliable, sensors = offered_qos(10), offered_qos(5, reliable=False)
-    types = {"/joint_states": (JOINT_STATE, reliable), "/diagnostics": (DIAGNOSTICS, reliable)}
+    types = {
+        "/joint_states": (JOINT_STATE, reliable),
+        "/diagnostics": (DIAGNOSTICS, reliable),
+        "/terrain": (CLOUD, reliable),
+        "/base_pose": (POSE, reliable),
+    }
     with BagWriter(path) as bag:
         for topic in dict.fromkeys(record.topic for record in records):
             bag.add_topic(topic, *types.get(topic, (WRENCH, sensors)))
@@ -353,6 +420,7 @@ def make_bags(folder: Path) -> None:
     )
     write_bag(folder / "quadruped_trot", list(joint_records(trot)))
     write_bag(folder / "hexapod_faults", list(faulty_records(tripod)))
+    write_bag(folder / "rough_terrain", list(terrain_records()))
 
 
 if __name__ == "__main__":

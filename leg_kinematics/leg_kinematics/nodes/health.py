@@ -29,11 +29,13 @@ class Health:
 
     Attributes:
         received: Messages of the input stream.
+        figures: Numbers to tell that are no warnings, by name.
         notes: Conditions that last, such as a leg that is not updated, by what they concern.
     """
 
     def __init__(self) -> None:
         self.received = 0
+        self.figures: dict[str, str] = {}
         self.notes: dict[str, str] = {}
         self._callbacks = 0
         self._refused: Counter[str] = Counter()
@@ -87,6 +89,7 @@ class Health:
             **_counts("dropped", self._dropped),
             **_counts("out of order", self._disordered),
             "internal faults": str(self._faults),
+            **self.figures,
             **self.notes,
             "last error": self._last_error,
         }
