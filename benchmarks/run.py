@@ -41,6 +41,7 @@ ENTRIES = {
     "single": "one point a call",
     "jansen": "Jansen's linkage, and pylinkage",
     "maps": "index map of the whole workspace",
+    "terrain": "foothold maps of terrain",
     "searches": "geometry search by worker processes",
     "startup": "import and compilation",
     "growth": "time and memory by number of points",

@@ -106,6 +106,16 @@ def test_a_stance_is_chosen_without_nodes():
     assert float(margin.split()[5]) > 0.0
 
 
+def test_footholds_are_found_on_rubble_stairs_a_slope_and_before_a_gap(tmp_path):
+    answer = run("06_footholds_on_terrain.py", "--output", tmp_path)
+    assert answer.code == 0, answer.errors
+    grounds = ("rubble", "stairs", "slope", "gap")
+    assert {path.name for path in tmp_path.iterdir()} == {f"terrain_{g}.png" for g in grounds}
+    lines = [line.split() for line in answer.output.splitlines() if "footholds; the best" in line]
+    assert len(lines) == 8
+    assert all(int(line[1]) > 20 and float(line[-1]) > 0.3 for line in lines)
+
+
 def test_without_nodes_an_example_says_how_to_start_them():
     answer = run("01_ask_one_foothold.py", ROS_DOMAIN_ID=claim_domain())
     assert answer.code == 1

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The terrain node: foothold maps are those of the library, and follow terrain, body and limits."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from leg_msgs_py.client import LegClient
 from leg_msgs_py.clouds import from_cloud, to_cloud
+from leg_msgs_py.recordings.bags import Bag
 from make_golden_bags import TERRAIN_STEP, rough_terrain
 from node_processes import NodeProcesses
 from nodes_support import START_TIMEOUT, set_parameter, wait_for
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
@@ -19,6 +23,9 @@ from leg_kinematics.robot import Mount
 from leg_statics.footholds import Contact, Verdict
 from leg_statics.terrain import foothold_map, gridded, survey
 
+BAG = Path(__file__).parent / "bags" / "rough_terrain"
+# Cells of the recorded terrain with a score, and the best score, at its five poses.
+GOLDEN = [(55, 0.8), (48, 0.693), (36, 0.4), (17, 0.4), (18, 0.425)]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FRONT, REAR = "left_front", "right_rear"
 
@@ -169,6 +176,35 @@ def test_friction_of_the_terrain_counts(mapper, hexapod):
         ),
         expected,
     )
+
+
+def test_a_recorded_terrain_is_judged_as_it_was(mapper, hexapod):
+    """The bag has a cloud and five poses; numbers of good cells and best scores are as ever."""
+    bag, seen = Bag(BAG), []
+    for message in bag.messages():
+        publisher = mapper.terrain if message.topic == "/terrain" else mapper.pose
+        publisher.publish(bytes(message.data))
+        if message.topic == "/terrain":
+            points, fields = from_cloud(deserialize_message(message.data, PointCloud2))
+            friction = fields["friction"].astype(float)
+            continue
+        pose = vars_of(deserialize_message(message.data, PoseStamped).pose)
+        expected = wanted(hexapod, FRONT, points, pose, friction=friction)
+        scores = expected[1].score[expected[2]]
+
+        def is_wanted(found, fields, scores=scores):
+            return len(found) == len(scores) and np.allclose(fields["score"], scores, atol=1e-5)
+
+        same(mapper.wait(accept=is_wanted), expected)
+        seen.append((int((scores > 0.0).sum()), round(float(scores.max()), 3)))
+    assert seen == GOLDEN
+
+
+def vars_of(pose):
+    """Return position and rotation of a pose."""
+    place, turn = pose.position, pose.orientation
+    rotation = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w])
+    return (place.x, place.y, place.z), rotation
 
 
 def test_terrain_in_the_base_frame_needs_no_pose(mapper, hexapod):
