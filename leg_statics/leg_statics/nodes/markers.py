@@ -6,7 +6,6 @@ Markers move with the base frame, and have no time: viewers know no transforms o
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -59,7 +58,6 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
     """
     mechanism, posture = scene.leg.mechanism, scene.posture
     linkage = mechanism.linkage(posture)
-    ends = [pair for bar in linkage.bars for pair in itertools.pairwise(bar)]
     foot = posture.foot_position[:3]
     cone: FloatArray = np.empty((0, 3))
     polytope: FloatArray = np.empty((0, 3))
@@ -71,7 +69,7 @@ def moving_markers(header: Any, scene: Scene) -> list[Any]:
             corners = force_polytope(jacobian, scene.leg.effort_limits, weight)
             polytope = foot + scene.force_scale * corners[np.ravel(EDGES)]
     shapes = (
-        ("linkage", Marker.LINE_LIST, BAR_WIDTH, STEEL, linkage.points[np.ravel(ends).astype(int)]),
+        ("linkage", Marker.LINE_LIST, BAR_WIDTH, STEEL, linkage.segments().reshape(-1, 3)),
         ("foot", Marker.SPHERE_LIST, FOOT_SIZE, RED, foot[None]),
         ("friction_cone", Marker.LINE_LIST, LINE_WIDTH, GREEN, cone),
         ("force_polytope", Marker.LINE_LIST, LINE_WIDTH, BLUE, polytope),

@@ -16,6 +16,7 @@ from std_msgs.msg import Header
 
 from leg_kinematics.arrays import FloatArray
 from leg_kinematics.nodes.node_process import run
+from leg_kinematics.nodes.rate_limit import RateLimit
 from leg_kinematics.nodes.robot_node import STREAM_QOS, RobotNode
 from leg_kinematics.robot import Robot
 from leg_statics.joint_layout import JointLayout
@@ -25,7 +26,6 @@ from leg_statics.leg_state import LegStates as States
 from leg_statics.leg_state import vectors_in_base
 from leg_statics.nodes.attitude import Attitude
 from leg_statics.nodes.contacts import declare_grounds
-from leg_statics.nodes.rate_limit import RateLimit
 from leg_statics.nodes.services import SERVICES
 from leg_statics.nodes.services.limits import limits_message
 from leg_statics.warm_up import warm_up_statics

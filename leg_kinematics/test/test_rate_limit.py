@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_statics.nodes.rate_limit import RateLimit
+from leg_kinematics.nodes.rate_limit import RateLimit
 
 rates = st.floats(0.01, 1000.0)
 
