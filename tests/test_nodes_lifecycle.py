@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes that start, stop, restart and change their robot; clients that live through it."""
 
-import ast
 import os
 import signal
 import subprocess
@@ -19,7 +18,6 @@ from node_processes import NodeProcesses, find_executable, node_names
 from nodes_support import PATIENCE, START_TIMEOUT, set_parameter, wait_for, wait_until_ready
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parent.parent
 FOOT = [-0.1, 0.0, -0.65]
@@ -513,18 +511,3 @@ def test_the_demo_shows_everything_and_ends_well(tmp_path):
         *("map_load_capacity.png", "map_rated_friction.png"),
         *("walk.json", "walk_steps.png", "walk_terrain.png"),
     }
-
-
-def test_the_launch_file_is_valid_and_starts_the_same_nodes():
-    tree = ast.parse((ROOT / "config" / "launch" / "leg_suite.launch.py").read_text())
-    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
-    assert functions == ["generate_launch_description", "_node"]
-    assert "nodes.yaml" in ast.unparse(tree)
-    known = YAML(typ="safe").load(ROOT / "config" / "nodes.yaml")
-    assert tuple(node["name"] for node in known["nodes"]) == node_names()
-    companions = [node["name"] for node in known["companions"]]
-    assert companions == ["designs", "gait", "viewer", "terrain"]
-    for node in (*known["nodes"], *known["companions"]):
-        package, executable = node["package"], node["executable"]
-        setup = (ROOT / package / "setup.py").read_text()
-        assert f'"{executable} = {package}.nodes.entry_points:{executable}"' in setup
