@@ -16,7 +16,7 @@ ROBOT ?= hexapod
 TERRAIN ?= level
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare papers clean
+.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare papers docs clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -72,6 +72,12 @@ bench-compare: setup  ## Show what changed since the saved baseline
 
 papers: setup  ## Recompute the published tables and show them side by side
 	$(VENV_PYTHON) tools/papers.py
+
+docs: setup  ## Build the docs site into build/site
+	@echo "Installing what builds it, unless it is there ..."
+	@$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile --no-deps \
+		--require-hashes --requirement docs/requirements.txt
+	$(VENV_PYTHON) tools/make_docs.py
 
 clean:  ## Remove the environment and all caches
 	rm -rf .venv .venv-lowest .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -63,16 +63,16 @@ def test_the_recipes_name_files_that_are_there(path):
 
 
 def imported_by_snippets():
-    """What the Python snippets of the README import, as dotted names."""
-    readme = (ROOT / "README.md").read_text()
-    for snippet in re.findall(r"```python\n(.*?)```", readme, re.DOTALL):
+    """What the Python snippets of the pages import, as dotted names."""
+    text = "".join(page.read_text() for page in PAGES)
+    for snippet in re.findall(r"```python[^\n]*\n(.*?)```", text, re.DOTALL):
         for node in ast.walk(ast.parse(snippet)):
             if isinstance(node, ast.ImportFrom):
                 yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 @pytest.mark.parametrize("reference", sorted(set(imported_by_snippets())))
-def test_what_the_snippets_of_the_readme_import_exists(reference):
+def test_what_the_snippets_import_exists(reference):
     assert resolve(reference) is not None
 
 

@@ -20,7 +20,6 @@ PAGES = [
 ]
 WALKING = "make run GAIT=yes"
 NODES = 5  # that it starts
-IN_PROCESS = ("in_process.py", "stance.py")  # without ROS
 ALONE = "test_gait.py"  # wants the joint states to itself
 # What an example says when all is well.
 SAID = {
@@ -33,6 +32,7 @@ SAID = {
 # Targets that run the tests, or run long: that make knows them is enough here.
 HEAVY_TARGETS = [
     "demo",
+    "docs",
     "test",
     "test-lowest",
     "bench",
@@ -42,6 +42,14 @@ HEAVY_TARGETS = [
     "papers",
 ]
 ELSEWHERE = ("rosdep ", "colcon ", "ros2 ", "pip ")  # what only a robot's machine has
+
+
+NAMED = re.compile(r'^```(?:python|yaml) title="([\w.]+)"\n(.*?)^```', re.DOTALL | re.MULTILINE)
+# What the pages tell to save, by its name.
+SAVED = dict(named for page in PAGES for named in NAMED.findall(page.read_text()))
+IN_PROCESS = [
+    name for name, text in SAVED.items() if name.endswith(".py") and "leg_msgs_py" not in text
+]
 
 
 def blocks(page, language):
@@ -102,18 +110,14 @@ def running(line, count, words="ready: robot"):
 
 @pytest.fixture(scope="module")
 def sandbox(tmp_path_factory):
-    """A folder as a newcomer has it, with the snippets of the README saved as it says."""
+    """A folder as a newcomer has it, with the snippets of the pages saved as they say."""
     folder = tmp_path_factory.mktemp("newcomer")
     for name in ("leg", "examples", "benchmarks"):
         (folder / name).symlink_to(ROOT / name)
-    readme = ROOT / "README.md"
-    names = ("my_planner.py", *IN_PROCESS, ALONE)
-    for name, snippet in zip(names, blocks(readme, "python"), strict=True):
-        (folder / name).write_text(snippet)
+    for name, text in SAVED.items():
+        (folder / name).write_text(text)
     model = ROOT / "config" / "robots" / "solo12.urdf"  # one that somebody may have
     (folder / "my_robot.urdf").write_bytes(model.read_bytes())
-    (study,) = blocks(readme, "yaml")
-    (folder / "study.yaml").write_text(study)
     return folder
 
 
@@ -142,9 +146,19 @@ def test_every_console_line_runs_as_it_is_printed(page, sandbox, walking):
             execute(line, sandbox, walking)
 
 
+def test_every_snippet_has_a_name_of_its_own_and_is_run():
+    pages = [page.read_text() for page in PAGES]
+    names = [name for text in pages for name, _ in NAMED.findall(text)]
+    assert sorted(names) == sorted(SAVED)
+    assert sum(text.count("```python") for text in pages) == sum(n.endswith(".py") for n in names)
+    told = " ".join(line for page in PAGES for line in lines(page))
+    assert {"in_process.py", "stance.py"} <= {*IN_PROCESS}
+    assert all(name in told for name in set(SAVED) - set(IN_PROCESS))
+
+
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_the_snippets_without_ros_need_no_more_than_is_said(sandbox, name):
-    text = (ROOT / "README.md").read_text()
+    text = (ROOT / "docs" / "first_query.md").read_text()
     (told,) = re.findall(r"without ROS \(([\w\s,.]+) are enough\)", text)
     names = re.split(r",\s+|\s+and\s+", told)
     program = GUARD.format(names=names, snippet=str(sandbox / name))

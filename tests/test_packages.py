@@ -24,7 +24,7 @@ INTERFACES = sorted(
 # The names under which rosdep knows what is imported under another name.
 ROSDEP_KEYS = {"ruamel": "python3-ruamel.yaml"}
 # What rosdep has no name for, as `requirements.in` names it: bags, design studies and the view need
-# it, the README tells to install it.
+# it, docs/installing.md tells to install it.
 FROM_PYPI = {
     "backports": "backports.zstd",
     "distributed": "distributed",
@@ -125,7 +125,7 @@ def test_what_the_code_imports_is_declared_and_nothing_else(package):
 
 def test_what_rosdep_does_not_know_is_required_and_told():
     required = (ROOT / "requirements.in").read_text()
-    told = (ROOT / "README.md").read_text()
+    told = (ROOT / "docs" / "installing.md").read_text()
     for name in FROM_PYPI.values():
         assert re.search(rf"^{re.escape(name)}\b", required, re.MULTILINE), name
         assert name in told

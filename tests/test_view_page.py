@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser_support import NoBrowserError, open_browser
+from headless_browser import NoBrowserError, open_browser
 from leg_msgs.msg import LegState, LegStates
 from leg_msgs_py.client import LegClient
 from node_processes import NodeProcesses

@@ -25,6 +25,7 @@ from leg_statics.view.readings import Reading, percent, quantity, table
 from leg_statics.view.scene import ask, make_scene
 from leg_statics.view.shapes import is_empty
 from leg_statics.view.standing import Playground
+from leg_statics.view.terrain import SHAPES
 from leg_statics.weight import LEVEL_GRAVITY
 
 LEG = "left_front"
@@ -83,6 +84,14 @@ def test_the_stance_is_told_what_evaluate_stances_answers_on_a_tilted_body(rough
     assert told["load factor"] == f"{answer.load_factor:.2f}"
     assert told["largest share in the stance"] == f"{100 * answer.utilisation:.1f} %"
     assert told["margin of the centre of mass"] == f"{region.margin:.3f} m"
+
+
+@pytest.mark.parametrize("terrain", SHAPES)
+def test_a_robot_stands_on_every_terrain_at_first(terrain):
+    playground = Playground.of(load_robot("hexapod"), terrain)
+    told = said(scene_of(playground, playground.setting).stance)
+    assert told["stance"] == "6 feet: stands"
+    assert float(told["load factor"]) > 1.0
 
 
 def test_a_foot_above_the_ground_carries_nothing(level):

@@ -43,7 +43,7 @@ EARTH = np.array([0.6, 0.55, 0.46])
 BODY = np.array([0.55, 0.6, 0.68])
 
 # Sizes as shares of the height of the robot's legs.
-BAR, JOINT, THIN, FOOT, CANDIDATE = 0.018, 0.07, 0.006, 0.06, 0.022
+BAR, JOINT, THIN, FOOT, CANDIDATE = 0.018, 0.055, 0.006, 0.06, 0.022
 CONE, FORCE = 0.25, 0.4  # height of a cone; length of the force that a leg carries at first
 LARGEST_SET = 6.0  # a force set beyond that is left out: there the structure carries nearly alone
 STEEPEST_CONE = 4.0  # friction as which a cone of rougher ground is drawn
@@ -153,7 +153,9 @@ def _told_of_stance(playground: Playground, stance: _Stance) -> Iterator[Reading
         return
     answer = stance.answer
     verdict = StanceVerdict(int(answer.verdict))
-    yield Reading("stance", f"{len(stance.legs)} feet: {words(verdict.name)}")
+    count = len(stance.legs)
+    feet = "1 foot" if count == 1 else f"{count} feet"
+    yield Reading("stance", f"{feet}: {words(verdict.name)}")
     yield Reading("load factor", quantity(float(answer.load_factor), "", 2))
     if answer.limiting_leg >= 0:
         leg = stance.legs[int(answer.limiting_leg)]

@@ -116,8 +116,8 @@ class Playground:
     def setting(self) -> Setting:
         """What is set at first: all feet on the ground and loads that they carry."""
         feet = np.array(list(self.first_feet.values()))
-        ground = float(np.max(self.terrain.height(feet)))
-        height = round(max(0.0, ground - float(feet[:, 2].min())), 3)
+        above = float(np.mean(self.terrain.height(feet) - feet[:, 2]))
+        height = round(max(0.0, above), 3)
         leg = next(iter(self.robot.legs))
         start = Setting(leg, FRICTION, load=0.0, mass=0.0, height=height)
         standing = self.stand(start)

@@ -114,7 +114,7 @@ def _level(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _slope(x: FloatArray, y: FloatArray) -> FloatArray:
-    return 0.25 * x + 0.0 * y
+    return 0.12 * x + 0.0 * y
 
 
 def _steps(x: FloatArray, y: FloatArray) -> FloatArray:
