@@ -18,8 +18,10 @@ from node_processes import NodeProcesses
 from nodes_support import PATIENCE, wait_for
 from playwright.sync_api import expect
 
+from leg_kinematics.errors import ShapeError, UnknownNameError
 from leg_statics import Contact, evaluate_footholds
-from leg_statics.view.page import Page
+from leg_statics.view.page import LiveStates, Page
+from leg_statics.view.readings import place_text
 from leg_statics.view.scene import ask, make_scene
 from leg_statics.view.standing import Playground
 
@@ -155,8 +157,7 @@ def test_a_click_on_the_ground_is_answered_for_that_place(tab, page, playground)
     assert place[2] == pytest.approx(playground.terrain.height(place), abs=1e-9)
     answers = ask(playground, playground.stand(page.setting), page.setting, place)
     assert LEG in answers
-    where = ", ".join(f"{value:.3f}" for value in place)
-    tab.get_by_text(f"{where} m").wait_for()
+    tab.get_by_text(place_text(place), exact=True).wait_for()
     capacities = [lines[1].text for lines in answers.values()]
     cells = tab.get_by_role("row").filter(has_text="load capacity")
     expect(cells).to_have_count(1 + len(answers))
@@ -189,6 +190,13 @@ def test_another_leg_can_be_chosen(tab, page, playground):
     expect(reading(tab, "foot")).to_have_text(expected["foot"])
 
 
+def test_what_a_robot_of_another_kind_tells_is_refused(page):
+    with pytest.raises(ShapeError, match=LEG):
+        page.show(LiveStates({LEG: [0.0, 0.0]}, {}, {}))
+    with pytest.raises(UnknownNameError, match="tail"):
+        page.show(LiveStates({"tail": [0.0, 0.0, 0.0]}, {}, {}))
+
+
 def test_the_page_is_served_on_this_machine_only(page):
     port = page.server.get_port()
     listening = subprocess.run(["cat", "/proc/net/tcp", "/proc/net/tcp6"], capture_output=True)
@@ -218,6 +226,9 @@ def test_the_viewer_node_shows_leg_states(browser, hexapod):
             wait_for(lambda: publisher.get_subscription_count() == 1)
             publisher.publish(states)
             expect(reading(tab, "stance")).to_contain_text("5 feet")
+            states.legs[1].contact = LegState.IN_THE_AIR
+            publisher.publish(states)
+            expect(reading(tab, "stance")).to_contain_text("4 feet")
 
 
 def shown_at(process):

@@ -21,7 +21,7 @@ from leg_statics import (
     support_region,
 )
 from leg_statics.view import colours
-from leg_statics.view.readings import Reading, percent, quantity, table
+from leg_statics.view.readings import Reading, percent, place_text, quantity, table
 from leg_statics.view.scene import ask, make_scene
 from leg_statics.view.shapes import is_empty
 from leg_statics.view.standing import Playground
@@ -188,7 +188,9 @@ def test_a_robot_that_tells_its_joints_is_shown_as_it_stands(level):
     setting = level.setting
     standing = level.stand(replace(setting, feet={LEG: (0.05, 0.0, 0.12)}))
     joints = {name: posture.joint_positions for name, posture in standing.postures.items()}
-    live = level.stand_as(joints)
+    told = level.stand_as(joints, {LEG: True, "right_rear": False})
+    assert set(told.touching) == set(level.robot.legs) - {"right_rear"}
+    live = level.stand_as(joints, {})
     assert set(live.touching) == set(level.robot.legs) - {LEG}
     for name in level.robot.legs:
         shown = live.pose.from_base(level.in_base(name, live.postures[name]))
@@ -230,4 +232,5 @@ def test_numbers_without_an_end_are_words():
     assert quantity(np.nan, "N") == "–"
     assert quantity(12.345, "N") == "12.3 N"
     assert percent(0.5) == "50.0 %"
+    assert place_text([-1e-5, 0.1234, -0.5]) == "0.000, 0.123, -0.500 m"
     assert table([Reading("a", "b")]).splitlines()[-1] == "| a | b |"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from leg_msgs.msg import LegStates
+from leg_msgs.msg import LegState, LegStates
 
 from leg_kinematics.nodes.node_process import run
 from leg_kinematics.nodes.robot_node import RobotNode
@@ -44,7 +44,7 @@ class ViewerNode(RobotNode):
         super().warm_up(robot)
         playground = Playground.of(robot)
         setting = playground.setting
-        make_scene(playground, playground.stand_as({}), setting)
+        make_scene(playground, playground.stand_as({}, {}), setting)
 
     def robot_changed(self) -> None:
         """Show the new robot on a page of the same address."""
@@ -59,6 +59,11 @@ class ViewerNode(RobotNode):
             LiveStates(
                 {state.leg: state.joint_positions for state in legs},
                 {state.leg: state.utilisation for state in legs},
+                {
+                    state.leg: state.contact == LegState.ON_THE_GROUND
+                    for state in legs
+                    if state.contact != LegState.CONTACT_UNKNOWN
+                },
             )
         )
 

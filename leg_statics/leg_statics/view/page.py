@@ -15,17 +15,18 @@ import numpy as np
 import viser
 from numpy.typing import ArrayLike
 
-from leg_kinematics.arrays import FloatArray
-from leg_statics.view.readings import Reading, table
+from leg_kinematics.arrays import FloatArray, as_array
+from leg_statics.view.readings import Reading, place_text, table
 from leg_statics.view.scene import Scene, ask, ground, make_scene
 from leg_statics.view.shapes import Arrows, Lines, Mesh, Points, Shape
-from leg_statics.view.standing import Playground, Setting, Standing
+from leg_statics.view.standing import NO_OFFSET, Playground, Setting, Standing
 from leg_statics.workspace import is_spatial_leg
 
 HOST = "127.0.0.1"  # nobody else's business
 STEEPEST_TILT, FARTHEST_TURN = 25.0, 45.0  # degrees
 HEIGHTS = (0.5, 1.4)  # of the body, as shares of its first height
 REACH = 0.5  # of the sliders of a foot, as a share of the height of the legs
+OF_FOOT = ("ahead", "aside", "above")  # sliders
 ROUGHEST = 1.5
 FIELD_OF_VIEW = 45.0  # degrees
 PANEL_WIDTH = 310  # of the readings [pixels]
@@ -44,10 +45,13 @@ class LiveStates(NamedTuple):
     Attributes:
         joint_positions: Actuated joints of legs by name (n,) [rad or m].
         utilisation: Largest share of an effort limit of each leg, by name; NaN if not known.
+        contact: Whether the feet of legs stand, by name; legs of which it is not known are left
+            out.
     """
 
     joint_positions: Mapping[str, ArrayLike]
     utilisation: Mapping[str, float]
+    contact: Mapping[str, bool]
 
 
 class Page:
@@ -63,10 +67,11 @@ class Page:
         self.playground = playground
         self.setting = playground.setting
         self._live = live
-        self._states = LiveStates({}, {})
+        self._states = LiveStates({}, {}, {})
         self._place: FloatArray | None = None
         self._drawn: dict[str, tuple[Shape, Any]] = {}
         self._changed, self._closing = threading.Event(), threading.Event()
+        self._sliding = threading.Lock()  # the setting and the sliders agree when it is free
         with contextlib.redirect_stdout(io.StringIO()):  # a banner that names it all a second time
             self.server = viser.ViserServer(
                 host=HOST, port=port, label="leg capacity", verbose=False
@@ -89,10 +94,24 @@ class Page:
         return f"http://{HOST}:{self.server.get_port()}"
 
     def show(self, states: LiveStates) -> None:
-        """Show a robot as it tells of itself; legs that are not told stay as they were."""
+        """Show a robot as it tells of itself; legs that are not told stay as they were.
+
+        Raises:
+            UnknownNameError: If the robot has no leg of a name.
+            ShapeError: If a leg has another number of joints.
+        """
+        for name, positions in states.joint_positions.items():
+            n = len(self.playground.robot.leg(name).joint_names)
+            as_array(f"joint positions of {name}", positions, n)
         self._states = LiveStates(
             {**self._states.joint_positions, **states.joint_positions},
             {**self._states.utilisation, **states.utilisation},
+            {
+                **{
+                    k: v for k, v in self._states.contact.items() if k not in states.joint_positions
+                },
+                **states.contact,
+            },
         )
         self._changed.set()
 
@@ -160,41 +179,40 @@ class Page:
 
     def _choose_leg(self) -> None:
         """Let the sliders of the foot show those of the leg that is chosen."""
-        offset = self.setting.feet.get(self._leg.value, (0.0, 0.0, 0.0))
-        self.setting = self._with(leg=self._leg.value)
-        for name, value in zip(("ahead", "aside", "above"), offset, strict=True):
-            if name in self._sliders:
-                self._sliders[name].value = value
-        self._enable_foot()
+        with self._sliding:
+            self.setting = replace(self.setting, leg=self._leg.value)
+            offset = self.setting.feet.get(self.setting.leg, NO_OFFSET)
+            for name, value in zip(OF_FOOT, offset, strict=True):
+                if name in self._sliders:
+                    self._sliders[name].value = value
+            self._enable_foot()
         self._changed.set()
 
     def _enable_foot(self) -> None:
         movable = is_spatial_leg(self.playground.robot.leg(self.setting.leg).mechanism)
-        for name in ("ahead", "aside", "above"):
+        for name in OF_FOOT:
             if name in self._sliders:
                 self._sliders[name].disabled = not movable
 
-    def _with(self, **changes: Any) -> Setting:
-        return replace(self.setting, **changes)
-
     def _read_sliders(self) -> Setting:
         """Return what is set."""
-        values = {name: float(slider.value) for name, slider in self._sliders.items()}
+        values: dict[str, Any] = {n: float(s.value) for n, s in self._sliders.items()}
         for name in ("roll", "pitch", "yaw"):
             if name in values:
                 values[name] = math.radians(values[name])
         feet = dict(self.setting.feet)
         if not self._live:
-            foot = values.pop("ahead"), values.pop("aside"), values.pop("above")
-            feet[self.setting.leg] = foot
-        return self._with(feet=feet, **values)
+            ahead, aside, above = (values.pop(name) for name in OF_FOOT)
+            feet[self.setting.leg] = ahead, aside, above
+        return replace(self.setting, feet=feet, **values)
 
     # ------------------------------------------------------------------ drawing
 
     def _keep_drawing(self) -> None:
         while self._changed.wait() and not self._closing.is_set():
             self._changed.clear()
-            self.setting = self._read_sliders()
+            with self._sliding:
+                self.setting = self._read_sliders()
             standing = self._stand()
             used = self._states.utilisation if self._live else None
             scene = make_scene(self.playground, standing, self.setting, used)
@@ -204,7 +222,8 @@ class Page:
 
     def _stand(self) -> Standing:
         if self._live:
-            return self.playground.stand_as(self._states.joint_positions)
+            states = self._states
+            return self.playground.stand_as(states.joint_positions, states.contact)
         return self.playground.stand(self.setting)
 
     def _put(self, scene: Scene) -> None:
@@ -269,11 +288,11 @@ def _same(one: Shape, other: Shape) -> bool:
 
 def answer_text(place: FloatArray, answers: Mapping[str, tuple[Reading, ...]]) -> str:
     """Return what is said of a place that was asked for (3,) [m], as Markdown."""
-    where = ", ".join(f"{value:.3f}" for value in place)
+    where = place_text(place)
     if not answers:
-        return f"**{where} m**: no leg reaches it."
+        return f"**{where}**: no leg reaches it."
     parts = [f"**{name}**\n\n{table(lines)}" for name, lines in answers.items()]
-    return "\n\n".join([f"**{where} m**", *parts])
+    return "\n\n".join([f"**{where}**", *parts])
 
 
 # --------------------------------------------------------------------------- shapes

@@ -7,6 +7,9 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 
 class Reading(NamedTuple):
     """One line of what is said.
@@ -32,6 +35,12 @@ def quantity(value: float, unit: str, digits: int = 1) -> str:
 def percent(share: float) -> str:
     """Return a share as a percentage."""
     return quantity(100.0 * share, "%")
+
+
+def place_text(place: ArrayLike) -> str:
+    """Return a place (3,) [m] as text, to the millimetre."""
+    rounded = np.round(np.asarray(place, dtype=np.float64), 3) + 0.0  # no negative zeros
+    return ", ".join(f"{value:.3f}" for value in rounded) + " m"
 
 
 def words(name: str) -> str:

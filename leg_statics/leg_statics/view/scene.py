@@ -27,7 +27,7 @@ from leg_statics.stance.region import SupportRegion, support_region
 from leg_statics.stance.stances import Load, Stances, StanceVerdict, evaluate_stances
 from leg_statics.stance.standing import robot_stance
 from leg_statics.view import colours
-from leg_statics.view.readings import Reading, percent, quantity, words
+from leg_statics.view.readings import Reading, percent, place_text, quantity, words
 from leg_statics.view.shapes import Arrows, Lines, Mesh, Points, Shape, is_empty
 from leg_statics.view.standing import Playground, Setting, Standing
 from leg_statics.weight import weight_efforts
@@ -259,7 +259,7 @@ def _told_of_leg(playground: Playground, standing: Standing, setting: Setting) -
     foot = _foot(playground, standing, setting.leg)
     if not np.isfinite(foot).all():
         foot = playground.foot_of(setting.leg, setting)
-    yield Reading("foot", ", ".join(f"{value:.3f}" for value in foot) + " m")
+    yield Reading("foot", place_text(foot))
     if not leg.mechanism.has_point_foot:
         yield Reading("posture", words(Status(int(posture.status)).name))
         return

@@ -153,13 +153,17 @@ class Playground:
                 postures[name] = leg.mechanism.initial_posture
         return Standing(pose, postures, tuple(touching))
 
-    def stand_as(self, joint_positions: Mapping[str, ArrayLike]) -> Standing:
+    def stand_as(
+        self, joint_positions: Mapping[str, ArrayLike], contact: Mapping[str, bool]
+    ) -> Standing:
         """Return how the robot stands with joints as they are told, its body level.
 
-        Its lowest foot is on the ground under the body, and so are those next to as low.
+        Its lowest foot is on the ground under the body. Where contact is not known, that foot
+        stands and those next to as low.
 
         Args:
             joint_positions: Actuated joints of legs by name (n,) [rad or m]; others as at first.
+            contact: Whether the feet of legs stand, by name, as far as it is known.
         """
         postures = {
             name: leg.mechanism.forward(joint_positions[name])
@@ -174,7 +178,7 @@ class Playground:
             name
             for name, foot in feet.items()
             if is_spatial_leg(self.robot.leg(name).mechanism)
-            and foot[2] - lowest <= TOUCHES * self.unit
+            and contact.get(name, bool(foot[2] - lowest <= TOUCHES * self.unit))
         ]
         return Standing(BodyPose((0.0, 0.0, height)), postures, tuple(touching))
 
