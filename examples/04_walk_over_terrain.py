@@ -131,7 +131,7 @@ class TerrainWalker(Node):
             del step["rejected_at"]
         return {
             "mass": self.gait.mass,
-            "required_load": self.gait.required_load,
+            "reserve": self.gait.reserve,
             "distance": self.distance,
             "arrived": self.planner.arrived(self.state),
             "reason": self.reason,
@@ -144,7 +144,7 @@ class TerrainWalker(Node):
         feet = ", ".join(f"{foothold.leg} on {foothold.ground}" for foothold in step.footholds)
         print(
             f"{number:3d}  x {step.body_end[0]:5.2f} m  height {step.body_height:.2f} m  "
-            f"step {step.step_length:.3f} m  {feet}"
+            f"step {step.step_length:.3f} m  margin {step.margin:.3f} m  {feet}"
         )
 
 
@@ -174,7 +174,7 @@ def write(walker: TerrainWalker, arguments: argparse.Namespace) -> None:
     arguments.output.mkdir(parents=True, exist_ok=True)
     for name, figure in (
         ("walk_terrain.png", plot_terrain(walker.terrain, walker.half_steps)),
-        ("walk_steps.png", plot_steps(walker.half_steps, walker.gait.required_load)),
+        ("walk_steps.png", plot_steps(walker.half_steps, walker.gait.reserve)),
     ):
         figure.savefig(arguments.output / name, dpi=200, bbox_inches="tight")
         print(f"wrote {arguments.output / name}")

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Choose the next foothold of a leg, then height and lean of the body, by what the stance carries.
 
-It asks in-process, without nodes:
+It asks in-process, without nodes; with a folder it draws the stance, and margins over a gait:
 
-    ./leg python examples/05_choose_stance.py
+    ./leg python examples/05_choose_stance.py --output stance_pictures
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,6 +17,7 @@ from leg_statics import (
     BodyPose,
     Load,
     StanceVerdict,
+    choose_stance,
     evaluate_stances,
     robot_stance,
     support_region,
@@ -22,6 +26,11 @@ from leg_statics import (
 MASS, FRICTION = 120.0, 0.4  # kg; cement
 NEXT, STANDING = "right_middle", ("left_front", "left_rear")
 HIP_HEIGHT = 0.65  # m
+STRIDE = np.linspace(-0.15, 0.15, 61)  # of the body over the feet [m]
+
+parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser.add_argument("--output", type=Path, help="folder of the pictures")
+output = parser.parse_args().output
 
 robot = load_robot("hexapod")
 feet = {name: robot.leg(name).mount.to_base((0.05, 0.0, -HIP_HEIGHT)) for name in STANDING}
@@ -38,14 +47,46 @@ print(f"the best carries {found.load_factor[found.best]:.2f} times as much")
 
 # Candidates of the body's pose over these feet; the centre of mass is the body's origin.
 heights, leans = np.meshgrid(np.linspace(-0.05, 0.05, 11), np.radians(np.linspace(-6, 6, 7)))
-position = np.stack([0.0 * heights, 0.0 * heights, heights], axis=-1)
-turned = Rotation.from_euler("y", leans.ravel()).as_matrix().reshape(*leans.shape, 3, 3)
+position = np.stack([0.0 * heights, 0.0 * heights, heights], axis=-1).reshape(-1, 3)
+turned = Rotation.from_euler("y", leans.ravel()).as_matrix()
 poses = BodyPose(position, turned)
-found = evaluate_stances(robot_stance(robot, feet, FRICTION, poses), Load(MASS, position))
-height, lean = heights.flat[found.best], np.degrees(leans.flat[found.best])
-factor = found.load_factor.flat[found.best]
-print(f"body {100.0 * height:+.0f} cm, pitch {lean:+.0f}°: {factor:.2f} times")
+choice = choose_stance(robot_stance(robot, feet, FRICTION, poses), Load(MASS, position))
+best, region = choice.best, choice.region
+print(
+    f"body {100.0 * heights.flat[best]:+.0f} cm, pitch {np.degrees(leans.flat[best]):+.0f}°: "
+    f"its centre of mass is {region.margin[best]:.3f} m inside what the feet support"
+)
 
-best = BodyPose(position.reshape(-1, 3)[found.best], turned.reshape(-1, 3, 3)[found.best])
-region = support_region(robot_stance(robot, feet, FRICTION, best), Load(MASS, best.position))
-print(f"its centre of mass is {region.margin:.3f} m inside what the feet support")
+if output:
+    from leg_statics.drawing.stances import plot_margins, plot_support_region
+
+    output.mkdir(parents=True, exist_ok=True)
+    pose = BodyPose(position[best], turned[best])
+    load = Load(MASS, position[best])
+    stance = robot_stance(robot, feet, FRICTION, pose)
+    held = evaluate_stances(stance, load)
+    title = f"hexapod on three feet, {MASS:g} kg, friction {FRICTION}: the best forces"
+    figure = plot_support_region(
+        support_region(stance, load, 36),
+        stance.position,
+        load.center_of_mass,
+        names=list(feet),
+        force=held.force,
+        title=title,
+    )
+    figure.savefig(output / "support_region.png", dpi=200)
+    body = STRIDE[:, None] * [1.0, 0.0, 0.0]
+    strides = robot_stance(robot, feet, FRICTION, BodyPose(body))
+    margins = {
+        f"{each:g} kg": support_region(strides, Load(each, body), 36).margin
+        for each in (MASS, 150.0, 180.0)
+    }
+    figure = plot_margins(
+        STRIDE,
+        margins,
+        time_label="body over the feet, forward [m]",
+        label="margin of the centre of mass [m]",
+        title=f"hexapod while one tripod carries it, friction {FRICTION}",
+    )
+    figure.savefig(output / "stance_margins.png", dpi=200)
+    print(f"wrote {output}/support_region.png and {output}/stance_margins.png")

@@ -77,51 +77,47 @@ def plot_terrain(terrain: Terrain, half_steps: Sequence[HalfStep]) -> Figure:
     return figure
 
 
-def plot_steps(half_steps: Sequence[HalfStep], required_load: float) -> Figure:
-    """Draw step length, load capacity and friction of every half step, one below the other."""
-    figure = Figure(figsize=(160 * MILLIMETRE, 130 * MILLIMETRE), layout="constrained")
-    steps, capacity, friction = figure.subplots(3, 1, sharex=True)
+def plot_steps(half_steps: Sequence[HalfStep], reserve: float) -> Figure:
+    """Draw step length, load factor, margin and friction of every half step."""
+    figure = Figure(figsize=(160 * MILLIMETRE, 160 * MILLIMETRE), layout="constrained")
+    steps, factor, margin, friction = figure.subplots(4, 1, sharex=True)
     number = np.arange(1, len(half_steps) + 1)
-    allowed = [step.allowed_step for step in half_steps]
-    for step, n in zip(half_steps, number, strict=True):
-        face, hatch = GROUNDS.get(step.ground, OTHER_GROUND)
+    grounds = [min(step.footholds, key=lambda f: f.friction).ground for step in half_steps]
+    for step, ground, n in zip(half_steps, grounds, number, strict=True):
+        face, hatch = GROUNDS.get(ground, OTHER_GROUND)
         steps.bar(n, step.step_length, color=face, hatch=hatch, edgecolor="0.35", lw=0.6, width=0.7)
-    steps.plot(number, allowed, "k_", markersize=9)
     steps.set_ylabel("step length [m]", fontsize=SMALL)
-    steps.set_ylim(bottom=0.0)
+    factor.plot(number, [step.load_factor for step in half_steps], "k.-", lw=0.8)
+    factor.axhline(reserve, color="black", linestyle="--", linewidth=1.0)
+    factor.annotate(
+        f"reserve {reserve:g}",
+        (number[-1], reserve),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=SMALL,
+    )
+    factor.set_ylabel("load factor of the\nstance, at worst", fontsize=SMALL)
+    margin.plot(number, [step.margin for step in half_steps], "k.-", lw=0.8)
+    margin.set_ylabel("margin of the centre\nof mass, at worst [m]", fontsize=SMALL)
     for leg in (leg for tripod in TRIPODS for leg in tripod):
         found = [(n, f) for n, s in zip(number, half_steps, strict=True) for f in s.footholds]
         mine = [(n, f) for n, f in found if f.leg == leg]
         style = {"color": COLOURS[leg], "marker": MARKERS[leg], "mec": "black", "mew": 0.3}
         at = [n + DODGE[leg.split("_")[1]] for n, _ in mine]
-        capacity.plot(at, [f.load_capacity for _, f in mine], ls="", markersize=4.5, **style)
-        friction.plot(at, [f.rated_friction for _, f in mine], ls="", markersize=4.5, **style)
+        friction.plot(at, [f.friction_used for _, f in mine], ls="", markersize=4.5, **style)
         friction.plot(at, [f.friction for _, f in mine], "k_", markersize=5)
-    capacity.axhline(required_load, color="black", linestyle="--", linewidth=1.0)
-    capacity.annotate(
-        f"required {required_load:.0f} N",
-        (number[-1], required_load),
-        xytext=(0, -3),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=SMALL,
-    )
-    capacity.set_ylim(0.0, 1.06 * capacity.dataLim.y1)
-    capacity.set_ylabel("least load capacity\nof the stance [N]", fontsize=SMALL)
-    friction.set_ylim(bottom=0.0)
-    friction.set_ylabel("friction: rated ($\\mu_e$, markers)\nand offered (bars)", fontsize=SMALL)
+    friction.set_ylabel("friction: used (markers)\nand offered (bars)", fontsize=SMALL)
     friction.set_xlabel("half step", fontsize=SMALL)
-    for ax in (steps, capacity, friction):
+    for ax in (steps, factor, margin, friction):
+        ax.set_ylim(bottom=0.0)
         ax.tick_params(labelsize=SMALL)
         ax.set_xticks(number)
         ax.grid(axis="y", color="0.9", linewidth=0.5)
         ax.set_axisbelow(True)
-    limits = sorted({step.ground for step in half_steps})
     steps.legend(
         handles=[
-            *(_swatch(f"step, {g} ahead", *GROUNDS.get(g, OTHER_GROUND)) for g in limits),
-            Line2D([], [], color="black", marker="_", ls="", label="longest allowed"),
+            _swatch(f"a foot on {g}", *GROUNDS.get(g, OTHER_GROUND)) for g in sorted({*grounds})
         ],
         fontsize=SMALL,
         frameon=False,

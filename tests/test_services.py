@@ -18,6 +18,7 @@ from leg_msgs_py.recordings.bag_writer import BagWriter
 from leg_msgs_py.recordings.bags import Bag
 from rclpy.action import get_action_server_names_and_types_by_node
 
+from leg_kinematics import load_robot
 from leg_kinematics.nodes.services import SERVICES as KINEMATICS
 from leg_statics.grounds import load_grounds
 from leg_statics.nodes.services import SERVICES as STATICS
@@ -29,6 +30,7 @@ SERVED = {service.name: service for services in OFFERED.values() for service in 
 ORDERS = [method for method in vars(LegClient).values() if isinstance(method, Order)]
 TOO_MANY = 10**9
 FOOT = [0.02, -0.05, -0.65]
+FOOT_IN_BASE = load_robot("hexapod").leg("left_front").mount.to_base(FOOT).tolist()
 CEMENT = Ground(name="cement")
 # A request for every service that is judged, with all that it can ask for.
 REQUESTS = {
@@ -48,6 +50,17 @@ REQUESTS = {
         "ground": CEMENT,
         "required_load": [200.0],
         "include_efforts": True,
+    },
+    "query_stance": {
+        "legs": ["left_front"],
+        "feet": [*FOOT_IN_BASE, 0.0, 0.0, -9.0],
+        "ground": "cement",
+        "mass": 5.0,
+        "center_of_mass": FOOT_IN_BASE,
+        "payload_position": FOOT_IN_BASE,
+        "margin_direction": [1.0, 0.0, 0.0],
+        "region_directions": 4,
+        "include_forces": True,
     },
     "query_step_length": {"legs": ["left_front"], "heights": [-0.65], "ground": CEMENT},
     "get_index_map": {"height": -0.65, "resolution": 0.1, "ground": CEMENT},
@@ -111,7 +124,7 @@ def as_recorded(types, message, name):
         values[field] = value = getattr(message, field)
         if hasattr(value, "get_fields_and_field_types"):
             values[field] = as_recorded(types, value, "/msg/".join(kind.split("/")))
-        elif isinstance(value, array.array):
+        elif isinstance(value, array.array) or kind == "sequence<boolean>":
             values[field] = np.array(value)
         elif kind == "sequence<boolean>":
             values[field] = np.array(value, dtype=bool)

@@ -270,14 +270,14 @@ def show_walk(plan: Path) -> bool:
     walk = json.loads(plan.read_text())
     title = (
         f"tripod walk over boards, ice, a pit and a kerb: {walk['mass']:g} kg, "
-        f"each foot must bear {walk['required_load']:.0f} N"
+        f"carried {walk['reserve']:g} times at every instant"
     )
-    columns = ("x, y [m]", "height", "step [m]", "allowed", "feet on", "capacity", "mu_e / mu")
+    columns = ("x, y [m]", "height", "step [m]", "feet on", "carried", "margin", "friction used")
     table = new_table(title, "", *columns, "refused for")
     for k, step in enumerate(walk["half_steps"], start=1):
         x, y, _ = step["body_end"]
         feet = step["footholds"]
-        tightest = max(feet, key=lambda foot: foot["rated_friction"] / foot["friction"])
+        tightest = max(feet, key=lambda foot: foot["friction_used"] / foot["friction"])
         grounds = Counter(foot["ground"] for foot in feet)
         refused = Counter(step["rejected"]).most_common(2)
         table.add_row(
@@ -285,10 +285,10 @@ def show_walk(plan: Path) -> bool:
             f"{x:.2f} {y:5.2f}",
             f"{step['body_height']:.2f}",
             f"{step['step_length']:.3f}",
-            f"{step['allowed_step']:.2f} {step['ground']}",
             ", ".join(f"{n} {ground}" for ground, n in grounds.most_common()),
-            f"{min(foot['load_capacity'] for foot in feet):.0f} N",
-            f"{tightest['rated_friction']:.2f} / {tightest['friction']:g}",
+            f"{step['load_factor']:.2f}",
+            f"{step['margin']:.3f} m",
+            f"{tightest['friction_used']:.2f} of {tightest['friction']:g}",
             ", ".join(reason for reason, _ in refused),
         )
     console.print(table)

@@ -6,6 +6,7 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
     name: hexapod
     base_frame: base_link
     units: {length: mm, angle: deg}
+    body: {mass: 120, center_of_mass: [0, 0, 50]}       # optional, of all the robot [kg]
     leg_types:
       initial:
         mechanism: parallel_drive
@@ -27,6 +28,8 @@ otherwise: position = scale · (told - zero). `scale` (default 1) is a number wi
 for a drive that counts the other way round; `zero` (default 0) is what the drive tells at joint
 position zero, in the file's unit of the joint. Efforts are divided by the scale. Limits, services
 and maps speak of the joints themselves.
+
+The mass counts for stances; of a robot model that tells its masses it is optional.
 
 Legs of a robot model need no leg type; see `leg_kinematics.model_description`:
 
@@ -72,7 +75,7 @@ from leg_kinematics.model_description import (
     ModelDescription,
     effort_range,
 )
-from leg_kinematics.robot import Drives, Leg, Mount, Robot
+from leg_kinematics.robot import Body, Drives, Leg, Mount, Robot
 
 MOST_LEGS = 64  # and leg types
 
@@ -89,6 +92,9 @@ LEG_TYPES = named_schema(
         "required": ["mechanism"],
     },
     MOST_LEGS,
+)
+BODY = mapping_schema(
+    {"mass": {**NUMBER, "exclusiveMinimum": 0}, "center_of_mass": VECTOR}, ["mass"]
 )
 TYPED_LEG = mapping_schema(
     {
@@ -121,6 +127,7 @@ def _check_robot(document: Document) -> None:
                 "units": mapping_schema(
                     {k: {"enum": list(UNITS[k])} for k in ("length", "angle")}, ["length", "angle"]
                 ),
+                "body": BODY,
                 "model": MODEL_SCHEMA,
                 "leg_types": LEG_TYPES,
                 "legs": {
@@ -246,7 +253,12 @@ def robot_from_document(document: Document) -> Robot:
         for name, entry in root["legs"].items()
     }
     _check_unique_joints(document, legs)
-    return Robot(root["name"], root["base_frame"], legs)
+    body = model.body() if model else None
+    if "body" in root:
+        center = root["body"].get("center_of_mass", (0.0, 0.0, 0.0))
+        x, y, z = (float(v) * units["length"] for v in center)
+        body = Body(float(root["body"]["mass"]), (x, y, z))
+    return Robot(root["name"], root["base_frame"], legs, body)
 
 
 def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any:

@@ -29,13 +29,14 @@ the first joint on the way to the foot, with the axes of the base.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from leg_kinematics.arrays import FloatArray
 from leg_kinematics.bodies import LegTree
 from leg_kinematics.documents import FOREIGN_NAME, PAIR, VECTOR, Document, mapping_schema
 from leg_kinematics.errors import DescriptionError, GeometryError, UnknownNameError
@@ -43,11 +44,12 @@ from leg_kinematics.files import existing_path
 from leg_kinematics.mechanism import Joint
 from leg_kinematics.mechanisms.leg_of_tree import leg_of_tree
 from leg_kinematics.mechanisms.model_leg import ModelLeg
+from leg_kinematics.model.chain import place_bodies
 from leg_kinematics.model.leg_tree import Foot, leg_tree, with_numbers
 from leg_kinematics.model.reading import read_closures, read_model
 from leg_kinematics.model.tree import Closure, ModelTree
 from leg_kinematics.placed_joints import PIN_LENGTH
-from leg_kinematics.robot import Leg, Mount
+from leg_kinematics.robot import Body, Leg, Mount
 
 EFFORT = {
     "description": "a number >= 0 (symmetric) or a pair [lower, upper]",
@@ -176,6 +178,40 @@ class ModelDescription:
             effort_limits=np.array([efforts[joint] for joint in mechanism.actuated]),
         )
 
+    def body(self) -> Body | None:
+        """Return mass and centre of the robot, each leg in its initial posture.
+
+        None if the file does not tell the masses of a leg, or no mass at all. Links that no leg
+        moves are where all joints at zero put them.
+        """
+        legs = [
+            self.mechanism(name)
+            for name, leg in self.document.root["legs"].items()
+            if "foot" in leg
+        ]
+        frames = self.tree.frames(self.base)
+        carried = {
+            link
+            for _, chain in legs
+            for joint in chain.joints
+            for link in self.tree.below(self._joints[joint.name].child)
+        }
+        parts = [
+            (link.mass, frames[name][1] + frames[name][0] @ link.centre)
+            for name, link in self.tree.links.items()
+            if name in frames and name not in carried and link.mass is not None
+        ]
+        parts += [
+            (mass, np.array(chain.origin) + centre)
+            for leg, chain in legs
+            for mass, centre in _masses(chain, np.array(leg.postures[0][1]))
+        ]
+        mass = sum(m for m, _ in parts)
+        if not 0.0 < mass < np.inf:
+            return None
+        x, y, z = (float(sum(m * centre[k] for m, centre in parts) / mass) for k in range(3))
+        return Body(float(mass), (x, y, z))
+
     def mechanism(self, name: str) -> tuple[ModelLeg, LegTree]:
         """Return the mechanism of a leg, which may lack effort limits, and its chain.
 
@@ -271,6 +307,15 @@ class ModelDescription:
 
     def _unknown(self, kind: str, name: str, allowed: Any, *where: Any) -> DescriptionError:
         return self.document.error(str(UnknownNameError(kind, str(name), allowed)), *where)
+
+
+def _masses(leg: LegTree, q: FloatArray) -> Iterator[tuple[float, FloatArray]]:
+    """Yield mass and centre in the leg frame of each body of a leg at joint positions (N,)."""
+    bodies = len(leg.joints) + 1
+    rotations, origins = np.zeros((bodies, 3, 3)), np.zeros((bodies, 3))
+    place_bodies(leg.chain, q, rotations, origins, np.zeros((bodies - 1, 3)))
+    for k, joint in enumerate(leg.joints, start=1):
+        yield joint.mass, origins[k] + rotations[k] @ joint.centre
 
 
 def model_path(document: Document, file: str, key: str) -> Path:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -180,6 +180,18 @@ class Leg:
         return self.mechanism.original if isinstance(self.mechanism, Mirrored) else self.mechanism
 
 
+class Body(NamedTuple):
+    """What the feet of a robot carry: all of it, its legs included.
+
+    Attributes:
+        mass: Mass [kg].
+        center_of_mass: Its centre in the base frame (3,), the legs in their initial postures [m].
+    """
+
+    mass: float
+    center_of_mass: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class Robot:
     """A robot with named legs.
@@ -188,12 +200,14 @@ class Robot:
         name: Name of the robot.
         base_frame: Name of the body's frame.
         legs: The legs by name, in the order of the description.
+        body: Mass of the robot and where it is; None if not known.
         frame_prefix: What stands before the names of its frames, as one of several robots.
     """
 
     name: str
     base_frame: str
     legs: Mapping[str, Leg]
+    body: Body | None = None
     frame_prefix: str = ""
 
     def leg(self, name: str) -> Leg:

@@ -125,6 +125,8 @@ MISTAKES = {
     "missing mechanism": ("    mechanism: parallel_drive\n", "", ["missing", "mechanism"]),
     "duplicate key": ("name: hexapod", "name: a\nname: hexapod", ["duplicate key"]),
     "unknown top-level key": ("name: hexapod", "name: hexapod\nnmae: x", ["nmae", "allowed"]),
+    "negative mass": ("{mass: 120,", "{mass: -1,", ["body.mass", "-1"]),
+    "mass without number": ("{mass: 120, ", "{", ["missing", "mass"]),
     "bad leg name": ("  left_front:", "  left front:", ["left front"]),
     "short vector": ("position: [450, 300, 0]", "position: [450, 300, 0], rpy: [0, 0]", ["legs.left_front.mount.rpy", "short"]),
     "NaN in a mount": ("[450, 300, 0]", "[450, .nan, 0]", ["mount.position.1", "nan"]),
@@ -206,6 +208,15 @@ def test_a_missing_file_and_an_unknown_robot_are_told(tmp_path):
     (tmp_path / "latin.yaml").write_bytes(b"name: \xff")
     with pytest.raises(DescriptionError, match=r"latin.yaml"):
         load_robot(tmp_path / "latin.yaml")
+
+
+def test_a_mass_and_its_centre_are_read(edited):
+    centre = "center_of_mass: [0, 0, 0]"
+    found = load_robot(edited(centre, "center_of_mass: [10, 0, -50]")).body
+    assert found.mass == 120.0
+    assert found.center_of_mass == pytest.approx((0.01, 0.0, -0.05))
+    assert load_robot(edited(f", {centre}", "")).body.center_of_mass == (0.0, 0.0, 0.0)
+    assert load_robot("quadruped").body is None
 
 
 def test_drives_tell_positions_by_scale_and_zero(edited):

@@ -64,6 +64,7 @@ def test_read_back_as_a_model_every_leg_is_the_same_in_every_mode(robot, write, 
         robot.base_frame,
         list(robot.legs),
     )
+    assert robot.body in (None, back.body)
     for leg in some_legs(robot):
         other = back.leg(leg.name)
         order = [leg.joint_names.index(name) for name in other.joint_names]

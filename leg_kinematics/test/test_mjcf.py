@@ -63,11 +63,16 @@ legs:
 
 
 @pytest.fixture(scope="module")
-def leg(tmp_path_factory):
+def robot(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mjcf")
     (folder / "leg.xml").write_text(LEG)
     (folder / "robot.yaml").write_text(ROBOT)
-    return load_robot(folder / "robot.yaml").leg("leg")
+    return load_robot(folder / "robot.yaml")
+
+
+@pytest.fixture(scope="module")
+def leg(robot):
+    return robot.leg("leg")
 
 
 def test_limits_efforts_and_loops_are_read(leg):
@@ -76,6 +81,19 @@ def test_limits_efforts_and_loops_are_read(leg):
     np.testing.assert_allclose(leg.mechanism.joint_limits[0], np.radians([-40, 40]))
     np.testing.assert_allclose(leg.effort_limits, [[-12, 12], [-12, 12], [-15, 10]])
     np.testing.assert_allclose(leg.mechanism.mass, 1.3)
+
+
+def test_mass_and_centre_of_the_robot_are_mujocos_in_the_initial_posture(robot, leg):
+    model = mujoco.MjModel.from_xml_string(LEG)
+    data, posture = mujoco.MjData(model), leg.mechanism.initial_posture
+    names = ("roll", "rear", "front", "knee", "pin")
+    for name, value in zip(names, [*posture.joint_positions, *posture.closure], strict=True):
+        data.qpos[model.joint(name).qposadr[0]] = value
+    mujoco.mj_forward(model, data)
+    trunk = model.body("trunk").id
+    assert robot.body.mass == pytest.approx(model.body_subtreemass[trunk])
+    center = data.subtree_com[trunk] - data.xpos[trunk]
+    np.testing.assert_allclose(robot.body.center_of_mass, center, atol=1e-9)
 
 
 def test_foot_jacobian_and_weight_are_mujocos(leg):

@@ -10,6 +10,7 @@ from leg_statics.indices import INDICES, evaluate_indices, supported_indices
 from leg_statics.joint_stream import JointStream
 from leg_statics.leg_state import LegStates
 from leg_statics.maps import IndexMap, line_map, plane_map, supported_layers, volume_map
+from leg_statics.stance.choice import StanceChoice, choose_stance
 from leg_statics.stance.region import SupportRegion, margin_along, support_region
 from leg_statics.stance.stances import (
     BestForces,
@@ -23,7 +24,7 @@ from leg_statics.stance.stances import (
     load_factor,
     payload,
 )
-from leg_statics.stance.standing import BodyPose, robot_stance
+from leg_statics.stance.standing import BodyPose, measured_stance, robot_load, robot_stance
 from leg_statics.step_length import (
     CommonStep,
     Criterion,
@@ -53,12 +54,14 @@ __all__ = [
     "LoadCapacity",
     "Multiples",
     "Stance",
+    "StanceChoice",
     "StanceVerdict",
     "Stances",
     "StepLength",
     "SupportRegion",
     "Verdict",
     "best_forces",
+    "choose_stance",
     "common_step",
     "evaluate_around",
     "evaluate_footholds",
@@ -71,8 +74,10 @@ __all__ = [
     "load_grounds",
     "longest_step",
     "margin_along",
+    "measured_stance",
     "payload",
     "plane_map",
+    "robot_load",
     "robot_stance",
     "support_region",
     "supported_indices",

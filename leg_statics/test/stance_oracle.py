@@ -62,7 +62,7 @@ def random_stance(rng, kind):
         upper = 10.0 ** rng.uniform(1.0, 3.0, (legs, n))
         lower = -upper
     else:
-        feet, jacobian, limits = pool(str(rng.choice(["hexapod", "quadruped"])))
+        feet, jacobian, limits = pool(str(rng.choice(["hexapod", "quadruped", "solo12"])))
         rows = rng.integers(len(feet), size=feet.shape[1])
         which = np.arange(feet.shape[1])
         feet, jacobian = feet[rows, which], jacobian[rows, which]

@@ -12,6 +12,7 @@ from stance_oracle import KINDS, compare, greatest_by_clarabel, random_stance
 from leg_kinematics import load_robot
 from leg_kinematics.errors import NotSupportedError, ShapeError, UnknownNameError, ValueRangeError
 from leg_statics.capacity.problem import load_capacity
+from leg_statics.stance.choice import choose_stance
 from leg_statics.stance.region import margin_along, support_region
 from leg_statics.stance.stances import (
     Load,
@@ -23,7 +24,8 @@ from leg_statics.stance.stances import (
     load_factor,
     payload,
 )
-from leg_statics.stance.standing import BodyPose, robot_stance
+from leg_statics.stance.standing import BodyPose, measured_stance, robot_load, robot_stance
+from leg_statics.weight import LEVEL_GRAVITY, weight_efforts
 
 G = 9.80665
 LEFT, RIGHT = (
@@ -36,6 +38,19 @@ TRIPOD = ("left_front", "right_middle", "left_rear")
 @pytest.fixture(scope="module")
 def hexapod():
     return load_robot("hexapod")
+
+
+@pytest.fixture(scope="module")
+def solo12():
+    return load_robot("solo12")
+
+
+def initial_feet(robot):
+    """The feet of all legs in their initial postures, in the base frame."""
+    return {
+        name: leg.mount.to_base(leg.mechanism.initial_posture.foot_position)
+        for name, leg in robot.legs.items()
+    }
 
 
 def feet_of(robot, names, foot=(0.05, 0.0, -0.65)):
@@ -197,6 +212,77 @@ def test_a_payload_at_the_centre_of_mass_is_what_the_load_factor_leaves(hexapod)
     more = payload(stance, Load(60.0, center), center).multiple
     factor = load_factor(stance, Load(60.0, center)).multiple
     assert 60.0 + more == pytest.approx(60.0 * factor, rel=1e-6)
+
+
+def test_a_leg_holds_its_links_besides(solo12):
+    feet = initial_feet(solo12)
+    stance = robot_stance(solo12, feet, 0.5)
+    for k, name in enumerate(feet):
+        mechanism = solo12.leg(name).mechanism
+        held = weight_efforts(mechanism, mechanism.initial_posture, LEVEL_GRAVITY)
+        np.testing.assert_allclose(stance.bias_efforts[k], held, atol=1e-9)
+        assert np.abs(held).max() > 0.05
+    found = evaluate_stances(stance, robot_load(solo12))
+    borne = np.einsum("lij,li->lj", stance.jacobian, found.force)
+    np.testing.assert_allclose(found.joint_efforts + borne, stance.bias_efforts, atol=1e-9)
+    assert found.stands
+    assert found.force.sum(axis=0)[2] == pytest.approx(2.5 * G, rel=1e-3)  # all of solo12
+
+
+def test_a_stance_by_its_joints_is_that_of_its_feet(solo12):
+    rng = np.random.default_rng(2)
+    joints = {
+        name: leg.mechanism.initial_posture.joint_positions + rng.uniform(-0.1, 0.1, (5, 3))
+        for name, leg in solo12.legs.items()
+    }
+    feet = {
+        name: leg.mount.to_base(leg.mechanism.forward(joints[name]).foot_position)
+        for name, leg in solo12.legs.items()
+    }
+    stands = np.array([True, True, True, False])
+    down = np.array([1.0, 0.5, -9.0])
+    load = robot_load(solo12, gravity=down)
+    told = measured_stance(solo12, joints, stands, 0.8, down)
+    on_feet = robot_stance(solo12, dict(list(feet.items())[:3]), 0.8, normal=-down, gravity=down)
+    found, wanted = evaluate_stances(told, load), evaluate_stances(on_feet, load)
+    np.testing.assert_allclose(found.load_factor, wanted.load_factor, rtol=1e-6, atol=1e-7)
+    np.testing.assert_array_equal(found.verdict, wanted.verdict)
+    assert found.stands.any()
+
+
+def test_a_load_without_a_mass_is_refused():
+    with pytest.raises(ValueRangeError, match="mass"):
+        robot_load(load_robot("quadruped"))
+
+
+def test_turning_a_robot_with_heavy_legs_changes_nothing_either(solo12):
+    feet = initial_feet(solo12)
+    level = evaluate_stances(robot_stance(solo12, feet, 0.6), robot_load(solo12))
+    turn = Rotation.from_rotvec([0.4, 0.3, -0.8]).as_matrix()
+    pose, down = BodyPose([1.0, 2.0, 3.0], turn), turn @ [0.0, 0.0, -G]
+    moved = {name: pose.from_base(foot) for name, foot in feet.items()}
+    stance = robot_stance(solo12, moved, 0.6, pose, normal=turn[:, 2], gravity=down)
+    found = evaluate_stances(stance, robot_load(solo12, pose, down))
+    assert found.load_factor == pytest.approx(float(level.load_factor), rel=1e-6)
+    np.testing.assert_allclose(found.force, level.force @ turn.T, atol=1e-3)
+
+
+def test_the_pose_chosen_has_the_largest_margin_of_those_that_stand(hexapod):
+    feet = feet_of(hexapod, TRIPOD)
+    shifts = np.random.default_rng(6).uniform([-0.2, -0.2, -0.1], [0.2, 0.2, 0.1], (40, 3))
+    poses = BodyPose(shifts)
+    stance = robot_stance(hexapod, feet, 0.4, poses)
+    choice = choose_stance(stance, Load(80.0, shifts))
+    margin, stands = choice.region.margin, choice.stances.stands
+    assert 1 < stands.sum() < len(shifts)
+    assert margin[choice.best] == margin[stands].max()
+    assert sorted(choice.ranking) == np.flatnonzero(stands).tolist()
+    assert (np.diff(margin[choice.ranking]) <= 0.0).all()
+    assert (margin[stands] > -1e-9).all()
+    posed = (stance.status == 0).all(axis=-1)
+    inside = margin > choice.region.error  # the true margin is larger by the error at most
+    assert stands[posed & inside].all()
+    assert not stands[margin < -1e-6 - choice.region.error].any()
 
 
 def test_turning_everything_changes_nothing(hexapod):

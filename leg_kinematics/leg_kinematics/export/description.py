@@ -29,6 +29,7 @@ def description_text(robot: Robot, file: str, *, closures: bool) -> str:
         f"# Made by export_robot of the robot {robot.name}.",
         f"name: {robot.name}",
         f"base_frame: {robot.base_frame}",
+        *_body(robot),
         "",
         "model:",
         f"  file: {file}",
@@ -44,6 +45,12 @@ def description_text(robot: Robot, file: str, *, closures: bool) -> str:
     for leg in legs:
         lines += _leg(leg)
     return "\n".join(lines) + "\n"
+
+
+def _body(robot: Robot) -> Iterable[str]:
+    if robot.body is not None:
+        mass, center = robot.body
+        yield f"body: {{mass: {_number(mass)}, center_of_mass: {_row(center)}}}"
 
 
 def _leg(leg: NamedLeg) -> Iterable[str]:

@@ -41,10 +41,10 @@ from leg_kinematics.kernels.cache import cache_folder, process_lock
 # To Python such functions are what they were; kernels compile them without what a call from Python
 # would need, which takes as long again. numpy's error model: in a kernel a division by zero yields
 # inf or NaN for that point, never an exception.
-scalar = register_jitable(error_model="numpy")
+scalar = register_jitable(error_model="numpy", no_cfunc_wrapper=True)
 # The same for short code without branches: loops of kernels take it in and compute several points
 # with one instruction.
-inlined = register_jitable(error_model="numpy", forceinline=True)
+inlined = register_jitable(error_model="numpy", no_cfunc_wrapper=True, forceinline=True)
 
 _thread_lock = threading.RLock()
 

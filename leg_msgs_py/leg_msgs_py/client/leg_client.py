@@ -25,6 +25,7 @@ from leg_msgs_py.client import (
     kinematics,
     limits,
     maps,
+    stances,
     steps,
 )
 from leg_msgs_py.client.calls import Caller
@@ -67,6 +68,7 @@ class LegClient:
 
     query_footholds = footholds.query_footholds
     query_footholds_of_legs = footholds.query_footholds_of_legs
+    query_stance = stances.query_stance
     query_step_length = steps.query_step_length
 
     index_map = maps.index_map

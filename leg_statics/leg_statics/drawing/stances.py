@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ def plot_support_region(
             va="center",
             fontsize=SMALL_FONT_SIZE,
         )
-    ax.set_aspect("equal")
+    ax.set_aspect("equal", adjustable="datalim")
     ax.invert_xaxis()
     ax.margins(0.7, 0.12)  # the names stand beside the feet
     ax.set_xlabel("$y$, to the left [m]", fontsize=FONT_SIZE)
@@ -86,7 +86,7 @@ def plot_support_region(
 
 def plot_margins(
     time: ArrayLike,
-    margins: dict[str, ArrayLike],
+    margins: Mapping[str, ArrayLike],
     *,
     label: str = "margin [m]",
     time_label: str = "phase of the gait",

@@ -23,29 +23,26 @@ import numpy as np
 from leg_kinematics.kernels.kernel import scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.vectors import cross, inner, length, tangents, unit
-from leg_statics.stance.interior_point import (
+from leg_statics.stance.cone_problem import (
     COUNT,
     FIXED,
     GROWING,
     GROWTH,
     HAS_CONE,
-    INFEASIBLE,
     MATRIX,
-    OPTIMAL,
     POINT,
     ROOM,
     ROW,
     ROW_Z,
     ROWS,
     TAU,
-    UNBOUNDED,
     T,
     X,
     Z,
     new_arrays,
     of_row,
-    solve,
 )
+from leg_statics.stance.interior_point import INFEASIBLE, OPTIMAL, UNBOUNDED, solve
 
 ROUGHEST = 1e3  # friction instead of infinity where efforts do not bound the force of a foot
 INVALID_INPUT = 4  # besides the statuses of `solve`
@@ -92,98 +89,51 @@ def greatest_multiple(
     leg_of = np.zeros(legs, np.int64)
     joint_of = np.zeros((legs, 2 * n + 1), np.int64)
     for p in range(len(stands)):
-        count = 0
-        for i in range(legs):
-            if stands[p, i]:
-                leg_of[count] = i
-                count += 1
-        body[COUNT] = count
         force[p] = joint_share[p] = pull_gain[p] = multiple[p] = math.nan
+        count = _put_standing(stands[p], leg_of)
+        body[COUNT] = count
         middle, arm = _middle(position[p], leg_of, count)
-        strength = 0.0
-        for k in range(count):
-            i = leg_of[k]
-            room = _strength(jacobian[p, i], lower[p, i], upper[p, i], bias[p, i] * parts[p, 0])
-            strength = max(strength, room)
         load, growth = _about(fixed[p], middle, arm), _about(growing[p], middle, arm)
-        load_size, growth_size = _size(load), _size(growth)
-        newton = load_size if load_size > 0.0 else (strength if strength > 0.0 else growth_size)
-        newton = newton if newton > 0.0 else 1.0
-        unit_of_t = newton / growth_size if growth_size > 0.0 else 1.0
-        rows = _moment_axes(free[p])
-        fewer = free[p, 0] != 0.0 or free[p, 1] != 0.0 or free[p, 2] != 0.0
-        _put_load(body, FIXED, load, rows, fewer, -1.0 / newton)
-        _put_load(body, GROWING, growth, rows, fewer, -unit_of_t / newton)
+        strength = _strength(jacobian[p], lower[p], upper[p], bias[p], parts[p, 0], leg_of, count)
+        newton, unit_of_t = _units(_size(load), _size(growth), strength)
+        turning = _moment_axes(free[p])
+        _put_load(body, FIXED, load, turning, -1.0 / newton)
+        _put_load(body, GROWING, growth, turning, -unit_of_t / newton)
+        check = newton + unit_of_t + _size(load)
         valid = True
-        check = newton + unit_of_t + parts[p, 0] + parts[p, 1] + load_size + growth_size
         for k in range(count):
             i = leg_of[k]
             mu = friction[p, i]
             if mu == math.inf and not _is_limited(lower[p, i], upper[p, i]):
                 mu = ROUGHEST
-            columns[k, HAS_CONE] = 1.0 if mu < math.inf else 0.0
-            direction = unit(normal[p, i])
-            first, second = tangents(direction)
-            slope = mu if mu < math.inf else 1.0
-            offset = (
-                (position[p, i, 0] - middle[0]) / arm,
-                (position[p, i, 1] - middle[1]) / arm,
-                (position[p, i, 2] - middle[2]) / arm,
-            )
-            for c in range(3):
-                vector = direction if c == 0 else (first if c == 1 else second)
-                part = 1.0 if c == 0 else slope
-                column = (part * vector[0], part * vector[1], part * vector[2])
-                moment = cross(offset, column)
-                for e in range(3):
-                    axes[k, e, c] = column[e]
-                    columns[k, MATRIX + 6 * c + e] = column[e]
-                    left_out = fewer and e == 2
-                    turning = 0.0 if left_out else inner(rows[e], moment)
-                    columns[k, MATRIX + 6 * c + 3 + e] = turning
-                    check += moment[e]
             valid &= mu >= 0.0
-            used = 0
-            for j in range(n):
-                column = (jacobian[p, i, 0, j], jacobian[p, i, 1, j], jacobian[p, i, 2, j])
-                size = length(column) * newton
-                idle, idle_growth = bias[p, i, j] * parts[p, 0], bias[p, i, j] * parts[p, 1]
-                idle_growth *= unit_of_t
-                check += size + idle
-                valid &= lower[p, i, j] <= upper[p, i, j]
-                valid &= (lower[p, i, j] < math.inf) & (upper[p, i, j] > -math.inf)
-                for sign, room in ((1.0, idle - lower[p, i, j]), (-1.0, upper[p, i, j] - idle)):
-                    per = max(size, abs(room), abs(idle_growth))
-                    if per == math.inf or per == 0.0:
-                        continue
-                    for c in range(3):
-                        limits[k, used, ROW + c] = (
-                            sign
-                            * newton
-                            / per
-                            * (
-                                column[0] * axes[k, 0, c]
-                                + column[1] * axes[k, 1, c]
-                                + column[2] * axes[k, 2, c]
-                            )
-                        )
-                    limits[k, used, GROWTH] = -sign * idle_growth / per
-                    limits[k, used, ROOM] = room / per
-                    joint_of[k, used] = j
-                    used += 1
+            columns[k, HAS_CONE] = 1.0 if mu < math.inf else 0.0
+            offset = _offset(position[p, i], middle, arm)
+            check += _put_matrix(columns, axes, k, normal[p, i], mu, offset, turning)
+            used, tried = _put_limits(
+                limits,
+                joint_of,
+                axes,
+                k,
+                jacobian[p, i],
+                lower[p, i],
+                upper[p, i],
+                bias[p, i],
+                parts[p],
+                newton,
+                unit_of_t,
+            )
+            check += tried
             if columns[k, HAS_CONE] == 0.0:
-                limits[k, used, ROW] = -1.0
-                limits[k, used, ROW + 1] = limits[k, used, ROW + 2] = 0.0
-                limits[k, used, GROWTH] = limits[k, used, ROOM] = 0.0
-                joint_of[k, used] = n
+                _put_push(limits, joint_of, k, used, n)
                 used += 1
             columns[k, ROWS] = used
         if not (valid & math.isfinite(check)):
             status[p] = INVALID_INPUT
             continue
         if count == 0:
-            status[p] = OPTIMAL if load_size == 0.0 else INFEASIBLE
-            multiple[p] = 0.0 if load_size == 0.0 else math.nan
+            status[p] = OPTIMAL if _size(load) == 0.0 else INFEASIBLE
+            multiple[p] = 0.0 if _size(load) == 0.0 else math.nan
             continue
         outcome = solve(body, columns, limits)
         status[p] = outcome
@@ -195,25 +145,128 @@ def greatest_multiple(
             multiple[p] = math.inf
         else:
             continue
-        for i in range(legs):
-            for c in range(3):
-                force[p, i, c] = 0.0
-            for j in range(n):
-                joint_share[p, i, j] = 0.0
-            pull_gain[p, i] = 0.0
-        per_gain = per * unit_of_t
+        force[p] = joint_share[p] = pull_gain[p] = 0.0
         for k in range(count):
             i = leg_of[k]
-            for e in range(3):
-                for c in range(3):
-                    force[p, i, e] += axes[k, e, c] * columns[k, POINT + X + c] * per * newton
-            pull_gain[p, i] = columns[k, POINT + Z] * per_gain / newton
-            for r in range(int(columns[k, ROWS])):
-                z = limits[k, r, of_row(POINT) + ROW_Z] * per_gain
-                if joint_of[k, r] == n:
-                    pull_gain[p, i] = z / newton
-                else:
-                    joint_share[p, i, joint_of[k, r]] += z * limits[k, r, ROOM]
+            _put_force(columns, axes, k, per * newton, force[p, i])
+            pull_gain[p, i] = _put_shares(
+                columns, limits, joint_of, k, per * unit_of_t, newton, joint_share[p, i]
+            )
+
+
+@scalar
+def _put_standing(stands, leg_of):
+    """Write the indices of the legs that stand and return how many they are."""
+    count = 0
+    for i in range(len(stands)):
+        if stands[i]:
+            leg_of[count] = i
+            count += 1
+    return count
+
+
+@scalar
+def _units(load, growth, strength):
+    """Return the unit of force, and that of t, with which the growing load has length 1."""
+    newton = load if load > 0.0 else (strength if strength > 0.0 else growth)
+    newton = newton if newton > 0.0 else 1.0
+    return newton, (newton / growth if growth > 0.0 else 1.0)
+
+
+@scalar
+def _offset(position, middle, arm):
+    """Return where a foot is from the middle of the feet."""
+    return (
+        (position[0] - middle[0]) / arm,
+        (position[1] - middle[1]) / arm,
+        (position[2] - middle[2]) / arm,
+    )
+
+
+@scalar
+def _put_matrix(columns, axes, k, normal, mu, offset, turning):
+    """Write what forces of a foot balance; return a number that is finite if all of it is."""
+    direction = unit(normal)
+    first, second = tangents(direction)
+    slope = mu if mu < math.inf else 1.0
+    check = 0.0
+    for c in range(3):
+        vector = direction if c == 0 else (first if c == 1 else second)
+        part = 1.0 if c == 0 else slope
+        column = (part * vector[0], part * vector[1], part * vector[2])
+        moment = cross(offset, column)
+        for e in range(3):
+            axes[k, e, c] = column[e]
+            columns[k, MATRIX + 6 * c + e] = column[e]
+            columns[k, MATRIX + 6 * c + 3 + e] = inner(turning[e], moment)
+            check += moment[e]
+    return check
+
+
+@scalar
+def _put_limits(limits, joint_of, axes, k, jacobian, lower, upper, bias, parts, newton, unit_of_t):
+    """Write the limits of a leg's efforts.
+
+    Returns:
+        How many they are, and a number that is finite if all of it is valid.
+    """
+    used = 0
+    check = parts[0] + parts[1]
+    for j in range(jacobian.shape[1]):
+        column = (jacobian[0, j], jacobian[1, j], jacobian[2, j])
+        size = length(column) * newton
+        idle, idle_growth = bias[j] * parts[0], bias[j] * parts[1] * unit_of_t
+        check += size + idle
+        if not (lower[j] <= upper[j] and lower[j] < math.inf and upper[j] > -math.inf):
+            check = math.nan
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            room = idle - lower[j] if side == 0 else upper[j] - idle
+            per = max(size, abs(room), abs(idle_growth))
+            if per == math.inf or per == 0.0:
+                continue
+            for c in range(3):
+                along = (axes[k, 0, c], axes[k, 1, c], axes[k, 2, c])
+                limits[k, used, ROW + c] = sign * newton / per * inner(column, along)
+            limits[k, used, GROWTH] = -sign * idle_growth / per
+            limits[k, used, ROOM] = room / per
+            joint_of[k, used] = j
+            used += 1
+    return used, check
+
+
+@scalar
+def _put_push(limits, joint_of, k, row, n):
+    """Write that a foot without a cone pushes at the ground."""
+    limits[k, row, ROW] = -1.0
+    limits[k, row, ROW + 1] = limits[k, row, ROW + 2] = 0.0
+    limits[k, row, GROWTH] = limits[k, row, ROOM] = 0.0
+    joint_of[k, row] = n
+
+
+@scalar
+def _put_force(columns, axes, k, per, force):
+    """Write the force of the ground on a foot."""
+    for e in range(3):
+        for c in range(3):
+            force[e] += axes[k, e, c] * columns[k, POINT + X + c] * per
+
+
+@scalar
+def _put_shares(columns, limits, joint_of, k, per, newton, shares):
+    """Write by how much the multiple grows if each limit of effort is doubled.
+
+    Returns:
+        By how much it grows for each newton with which the foot may pull.
+    """
+    gain = columns[k, POINT + Z] * per / newton
+    for r in range(int(columns[k, ROWS])):
+        z = limits[k, r, of_row(POINT) + ROW_Z] * per
+        if joint_of[k, r] == len(shares):
+            gain = z / newton
+        else:
+            shares[joint_of[k, r]] += z * limits[k, r, ROOM]
+    return gain
 
 
 @scalar
@@ -242,15 +295,25 @@ def _is_limited(lower, upper):
 
 
 @scalar
-def _strength(jacobian, lower, upper, idle):
-    """Return the force that the weakest joint of a leg bears, 0 if none limits."""
-    least = math.inf
-    for j in range(jacobian.shape[1]):
-        size = length((jacobian[0, j], jacobian[1, j], jacobian[2, j]))
-        room = max(upper[j] - idle[j], idle[j] - lower[j])
-        if size > 0.0:
-            least = min(least, room / size)
-    return least if least < math.inf else 0.0
+def _strength(jacobian, lower, upper, bias, part, leg_of, count):
+    """Return a force of the magnitude that the strongest leg bears, 0 if none limits.
+
+    That is the geometric mean of what its joints bear, since one may be powerless or idle.
+    """
+    strength = 0.0
+    for k in range(count):
+        i = leg_of[k]
+        total, joints = 0.0, 0
+        for j in range(jacobian.shape[2]):
+            size = length((jacobian[i, 0, j], jacobian[i, 1, j], jacobian[i, 2, j]))
+            idle = bias[i, j] * part
+            room = max(upper[i, j] - idle, idle - lower[i, j])
+            if size > 0.0 and 0.0 < room < math.inf:
+                total += math.log(room / size)
+                joints += 1
+        if joints > 0:
+            strength = max(strength, math.exp(total / joints))
+    return strength
 
 
 @scalar
@@ -275,19 +338,17 @@ def _size(wrench):
 
 @scalar
 def _moment_axes(free):
-    """Return the axes of the equations of moments; the last is that about which any is borne."""
+    """Return the axes of the equations of moments; none for that about which any is borne."""
     if free[0] == 0.0 and free[1] == 0.0 and free[2] == 0.0:
         return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    last = unit(free)
-    first, second = tangents(last)
-    return first, second, last
+    first, second = tangents(unit(free))
+    return first, second, (0.0, 0.0, 0.0)
 
 
 @scalar
-def _put_load(body, at, load, axes, fewer, factor):
+def _put_load(body, at, load, turning, factor):
     """Write a load as right sides of the equations."""
     moment = (load[3], load[4], load[5])
     for e in range(3):
         body[at + e] = factor * load[e]
-        left_out = fewer and e == 2
-        body[at + 3 + e] = 0.0 if left_out else factor * inner(axes[e], moment)
+        body[at + 3 + e] = factor * inner(turning[e], moment)

@@ -196,14 +196,19 @@ class Stances(NamedTuple):
     @property
     def ranking(self) -> NDArray[np.int64]:
         """Flat indices of the stances that stand, largest load factor first."""
-        standing = np.flatnonzero(self.stands)
-        return standing[np.argsort(-np.ravel(self.load_factor)[standing], kind="stable")]
+        return ranking_of(self.stands, self.load_factor)
 
     @property
     def best(self) -> int:
         """Flat index of the first of the ranking, -1 if none stands."""
         ranking = self.ranking
         return int(ranking[0]) if len(ranking) else -1
+
+
+def ranking_of(stands: NDArray[np.bool_], merit: FloatArray) -> NDArray[np.int64]:
+    """Return the flat indices of the stances that stand, that of the greatest merit first."""
+    standing = np.flatnonzero(stands)
+    return standing[np.argsort(-np.ravel(merit)[standing], kind="stable")]
 
 
 def evaluate_stances(stance: Stance, load: Load) -> Stances:
@@ -404,7 +409,7 @@ def _limits(feet: Stance, force: Any, share: Any, gain: Any, load_size: Any) -> 
     part = np.asarray(load_size)[..., None] / legs
     slip, pull = gain * pressure, gain * np.where(pressure <= 1e-6 * part, part, 0.0)
     shares = np.concatenate([share, slip[..., None], pull[..., None]], axis=-1)
-    flat = shares.reshape(*shares.shape[:-2], -1)
+    flat = shares.reshape(*shares.shape[:-2], shares.shape[-2] * shares.shape[-1])
     which = np.argmax(np.nan_to_num(flat, nan=-np.inf), axis=-1)
     n = share.shape[-1]
     leg, what = which // (n + 2), which % (n + 2)

@@ -8,6 +8,7 @@ from leg_statics.nodes.services import (
     indices,
     limits,
     maps,
+    stances,
     steps,
 )
 
@@ -18,6 +19,7 @@ SERVICES = {
         indices.evaluate_indices,
         description.get_leg_description,
         footholds.query_footholds,
+        stances.query_stance,
         steps.query_step_length,
         limits.set_effort_limits,
     ),
