@@ -18,10 +18,14 @@ from ros import Client, child, suite_nodes
 from std_srvs.srv import Trigger
 from workload import BATCH, CONTACT, FRICTION, hexapod_leg, reachable_positions
 
+from leg_kinematics import load_robot
 from leg_kinematics.arrays import FloatArray
+from leg_statics import Load, evaluate_stances, robot_stance
 from leg_statics.footholds import evaluate_footholds
 
 LEG = "right_front"
+STANCES = 1000
+STANDING = ("left_front", "left_rear")
 EMPTY = "empty Trigger"
 IDLE = ", no work"  # the same messages, answered with what lies ready
 ONE_POINT = Goal(1.5, accepted=2.0)
@@ -74,6 +78,9 @@ def rows(settings: Settings) -> Iterator[Row]:
         for name in services:
             yield messages_row(name, make[name], calls[name](), settings)
         yield from through_leg_client(feet[0], settings)
+
+        settings.show(f"{STANCES:,} stances")
+        yield from stances_of_one_foot(feet[:STANCES], settings)
 
         settings.show(f"{BATCH:,} points")
         samples = sample(
@@ -147,6 +154,23 @@ def mixed_contacts(
     share = float(np.median(durations["mixed"]) / np.median(durations["one"]))
     note = "friction, normal and load of each candidate"
     yield Row(f"{name} / one contact", share, "x", goal=Goal(1.2), note=note)
+
+
+def stances_of_one_foot(candidates: FloatArray, settings: Settings) -> Iterator[Row]:
+    """Yield the round trip of candidates of one foot, two others where they are."""
+    robot = load_robot("hexapod")
+    feet = {name: robot.leg(name).mount.to_base((0.05, 0.0, -0.65)) for name in STANDING}
+    feet["right_middle"] = robot.leg("right_middle").mount.to_base(candidates)
+    with LegClient() as legs:
+        answer = legs.query_stance(feet, FRICTION, mass=60.0)
+        found = evaluate_stances(robot_stance(robot, feet, FRICTION), Load(60.0))
+        np.testing.assert_array_equal(answer.verdict, found.verdict)
+        np.testing.assert_allclose(answer.load_factor, found.load_factor, rtol=1e-9)
+        durations = sample(
+            {"ask": lambda: legs.query_stance(feet, FRICTION, mass=60.0)}, settings.count(100, 5)
+        )["ask"]
+    name = f"query_stance, {len(candidates):,} candidates of one foot"
+    yield from percentiles(name, durations, Goal(60e-3))
 
 
 def parts_of_footholds(
