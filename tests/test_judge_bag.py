@@ -19,6 +19,7 @@ from rosbags.highlevel import AnyReader
 
 from leg_kinematics import load_robot
 from leg_kinematics.status import Status
+from leg_statics import evaluate_stances, measured_stance, robot_load, support_region
 from leg_statics.capacity.problem import load_capacity
 from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.indices import condition_number, rated_friction, rated_friction_full
@@ -28,6 +29,7 @@ from leg_statics.recordings import findings as judge_findings
 from leg_statics.recordings.bag_judge import BagJudge, Judgement, Topics
 from leg_statics.recordings.findings import Findings
 from leg_statics.recordings.judge_bag import main
+from leg_statics.recordings.judged_stances import DIRECTIONS, INTERVAL
 
 BAGS = Path(__file__).parent / "bags"
 TRIPOD, TROT, FAULTS = BAGS / "hexapod_tripod", BAGS / "quadruped_trot", BAGS / "hexapod_faults"
@@ -171,6 +173,28 @@ def test_wrenches_are_weighed_against_capacity_friction_and_efforts():
         )
         # the recorded efforts are those that hold the recorded wrenches, up to their resolution
         np.testing.assert_allclose(found.required_utilisation, found.joint_utilisation, atol=1e-3)
+
+
+def test_the_stance_is_judged_where_all_wrenches_are_known(hexapod):
+    legs, judge, _ = judged(Bag(TRIPOD), "hexapod", Topics(wrenches=WRENCHES))
+    time = legs[LEGS[0]].time
+    _, rows = np.unique(time // INTERVAL, return_index=True)
+    joints = {leg: found.joint_positions[rows] for leg, found in legs.items()}
+    force = np.stack([found.force[rows, 2] for found in legs.values()], axis=-1)
+    known = np.isfinite(force).all(axis=-1)
+    joints = {leg: q[known] for leg, q in joints.items()}
+    stance = measured_stance(hexapod, joints, force[known] >= 10.0, 0.4)
+    load = robot_load(hexapod)
+    found = evaluate_stances(stance, load)
+    margin = support_region(stance, load, DIRECTIONS).margin
+    assert judge.stances.known == known.sum() > 10
+    assert judge.stances.carried == np.sum(found.load_factor >= 1.0)
+    worst = np.nanargmin(margin)
+    assert judge.stances.margin == pytest.approx((margin[worst], time[rows][known][worst]))
+    assert judge.stances.load_factor.value == pytest.approx(
+        np.nan_to_num(found.load_factor).min(), rel=1e-9
+    )
+    assert judged(Bag(TRIPOD), "hexapod")[1].stances.known == 0
 
 
 def test_a_wrench_in_the_base_frame_is_turned_into_the_leg_frame(tmp_path):
@@ -391,6 +415,7 @@ def test_the_report_tells_what_matters(tripod_files):
     assert "| ground | cement, friction 0.4 |" in text
     assert "| command | judge\\_bag " in text or "| command | judge_bag " in text
     assert "| recorded | 2023-11-14 22:13:20 UTC to 2023-11-14 22:13:25 UTC |" in text
+    assert "margin of the centre of mass in the support region" in text
     assert "/drives: motors told WARN: warm" in text
     assert "| /drives: motors | OK 4, WARN 2 | WARN at 4.001" in text
     for leg in LEGS:

@@ -28,6 +28,7 @@ from leg_statics.efforts import joint_efforts, utilisation
 from leg_statics.joint_pieces import JointPieces, WholeLegs
 from leg_statics.joint_stream import CONTACT_FORCE, JointStateError, JointStream, StampOrder
 from leg_statics.leg_state import LegStates
+from leg_statics.recordings.judged_stances import JudgedStances
 from leg_statics.weight import level_gravity, weight_efforts
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -200,6 +201,7 @@ class BagJudge:
         gap: A longer pause between joint states is told [s].
         inputs: Names of the topics to take.
         tally: What became of the inputs so far.
+        stances: How the robot stood.
 
     Raises:
         UnknownNameError: If a leg is not known.
@@ -220,6 +222,7 @@ class BagJudge:
         self.gap = gap
         self.inputs = topics.check(bag)
         self.tally = Tally()
+        self.stances = JudgedStances()
         self._bag = bag
         self._friction = friction
         self._stream = JointStream(robot, friction, contact_force)
@@ -268,6 +271,7 @@ class BagJudge:
                 self.tally.refuse(f"{self.topics.joint_states}: {error}", len(rows))
                 continue
             self._count_missing(names, states, len(rows))
+            self._judge_stances(rows, states)
             for k, name in enumerate(states.legs):
                 leg = self.robot.leg(name)
                 columns = [names.index(joint) for joint in leg.joint_names]
@@ -387,6 +391,14 @@ class BagJudge:
             self.tally.foreign_names = names
 
     # ------------------------------------------------------------------ judgement
+
+    def _judge_stances(self, rows: list[_Row], states: LegStates) -> None:
+        load = {}
+        for name in self.topics.wrenches:
+            force = np.stack([np.broadcast_to(row.wrenches[name], (2, 3))[0] for row in rows])
+            load[name] = self.robot.leg(name).mount.vectors_to_base(force)[:, 2]
+        time = np.array([row.time for row in rows])
+        self.stances.add(self.robot, self._friction, states, load, self._contact_force, time)
 
     def _judgement(
         self, leg: Leg, rows: list[_Row], states: LegStates, k: int, efforts: FloatArray | None

@@ -17,6 +17,7 @@ from leg_statics.footholds import Verdict
 from leg_statics.recordings.checks import Check, complaints, gaps, limit_checks
 from leg_statics.recordings.diagnostic_log import level_name
 from leg_statics.recordings.findings import Findings, Moment, Quantity
+from leg_statics.recordings.judged_stances import INTERVAL
 from leg_statics.recordings.query_judge import Query, QueryFindings, QueryTally
 from leg_statics.recordings.report_case import Case
 
@@ -56,6 +57,7 @@ def report_text(case: Case, pictures: Mapping[str, str]) -> str:
         *_recording(case),
         "## Joint states",
         *_inputs(case, clock),
+        *(["## Stances", *_stances(case, clock)] if case.judge.stances.known else []),
         *(["## Legs", *_legs(case), "## Worst moments", *_moments(case, clock)] if judged else []),
         "## Queries of planners",
         *_queries(case, clock),
@@ -221,6 +223,21 @@ def _legs(case: Case) -> list[str]:
         _table(("poses", *(status.name for status in columns)), statuses),
         "Worst values, and how often they are beyond the limit:",
         _table(("leg", *map(_limit_text, known)), rows),
+    ]
+
+
+def _stances(case: Case, clock: _Clock) -> list[str]:
+    """Return how the robot stood."""
+    stances = case.judge.stances
+    rows = [
+        ("load factor: how many times the feet carry the robot", stances.load_factor),
+        ("margin of the centre of mass in the support region [m]", stances.margin),
+    ]
+    told = [(label, _number(w.value), clock.at(w.time)) for label, w in rows if w.value < np.inf]
+    return [
+        f"The feet carry the robot in {stances.carried} of {stances.known} stances, one each "
+        f"{1e-6 * INTERVAL:g} ms, on level ground at rest.",
+        _table(("worst", "value", "when [s]"), told),
     ]
 
 
