@@ -16,7 +16,7 @@ ROBOT ?= hexapod
 TERRAIN ?= level
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare papers docs clean
+.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare physics papers docs clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -69,6 +69,9 @@ bench: setup  ## Measure speed through the public interfaces, and that of other 
 
 bench-compare: setup  ## Show what changed since the saved baseline
 	$(VENV_PYTHON) benchmarks/compare.py
+
+physics: setup  ## Press legs in MuJoCo until they give way, beside what is predicted
+	$(VENV_PYTHON) tools/physics.py
 
 papers: setup  ## Recompute the published tables and show them side by side
 	$(VENV_PYTHON) tools/papers.py

@@ -32,6 +32,7 @@ WRITTEN: dict[str, dict[str, str]] = {
         "Conventions": "docs/conventions.md",
         "The view": "docs/view.md",
         "Stances": "docs/stances.md",
+        "Physics as witness": "docs/physics.md",
         "Papers and equations": "docs/papers.md",
         "How it is checked": "docs/checks.md",
         "Speed": "benchmarks/README.md",
