@@ -16,7 +16,7 @@ ROBOT ?= hexapod
 TERRAIN ?= level
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts bench bench-compare physics papers docs clean
+.PHONY: help setup demo run view test test-lowest lint typecheck soak stances contacts robots bench bench-compare physics papers docs clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -60,6 +60,11 @@ stances: setup  ## Compare the load factors of 10,000 random stances with a coni
 
 contacts: setup  ## Compare what 10,000 contacts of their own carry with a conic solver
 	cd leg_statics/test && $(VENV_PYTHON) test_mixed_contacts.py 10000
+
+robots: setup  ## Compare legs of public robots with Pinocchio; installs 200 MB
+	@$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile --no-deps \
+		--require-hashes --requirement tests/robots/requirements.txt
+	$(VENV_PYTHON) -m pytest tests/robots/pinocchio_robots.py
 
 bench: setup  ## Measure speed through the public interfaces, and that of other software
 	@echo "Installing what to compare with, unless it is there ..."

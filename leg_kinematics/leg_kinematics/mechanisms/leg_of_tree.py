@@ -18,7 +18,6 @@ from leg_kinematics.model import three_revolute
 from leg_kinematics.model.equations import Equations, evaluate, new_room
 from leg_kinematics.model.leg_tree import WHOLE_TURN
 from leg_kinematics.model.postures import assembled, independent_rows
-from leg_kinematics.status import Status
 
 ISOTROPIC = 0.05  # ratio of singular values of J below which a posture is near a singularity
 BENDS = 5  # trial positions of each joint, where the zero posture is singular
@@ -74,11 +73,7 @@ def leg_of_tree(
         ),
         tuple(_excursion(tree, k, initial[k]) for k in passive),
     )
-    if leg.initial_posture.status == Status.SINGULAR:
-        raise GeometryError(
-            f"the initial posture {dict(zip(names, initial.round(6).tolist(), strict=True))} is "
-            "singular: give one in which every actuator moves the foot"
-        )
+    leg.initial_posture  # noqa: B018  raises GeometryError
     return leg
 
 
@@ -146,7 +141,8 @@ def _bent(tree: LegTree, rest: FloatArray) -> FloatArray:
     n = len(rest)
     every = np.arange(n, dtype=np.float64)
     none = every[:0]
-    equations = Equations(tree.chain, tree.loops, tree.foot, none, every, none, rest, np.zeros(2))
+    signs = np.zeros(3), np.zeros(2)
+    equations = Equations(tree.chain, tree.loops, tree.foot, none, every, none, rest, *signs)
     room = new_room(n, 0, n)
 
     def condition_and_depth(q: FloatArray) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from leg_kinematics.bodies import LegTree
 from leg_kinematics.geometry import check_ranges
 from leg_kinematics.mechanism import Joint, Linkage, Mechanism, Posture
 from leg_kinematics.model import solved
-from leg_kinematics.model.equations import Equations
+from leg_kinematics.model.equations import Equations, evaluate, new_room
 from leg_kinematics.model.postures import independent_rows
 
 Ranges = tuple[tuple[float, float], ...]
@@ -101,7 +101,7 @@ class ModelLeg(Mechanism):
         actuated = [names.index(name) for name in self.actuated]
         passive = [k for k in range(len(names)) if k not in actuated]
         initial = np.array(self.postures[0][1])
-        return Equations(
+        equations = Equations(
             self.tree.chain,
             self.tree.loops,
             self.tree.foot,
@@ -109,8 +109,15 @@ class ModelLeg(Mechanism):
             np.array(actuated, dtype=np.float64),
             np.array(passive, dtype=np.float64),
             initial[actuated],
+            np.zeros(3),
             np.zeros(2),
         )
+        if len(actuated) != 2:
+            return equations
+        room = new_room(len(names), len(self.tree.coincidences), 2)
+        evaluate(equations, initial, room)
+        normal = np.cross(*room.twist[:3].T) @ room.rotations[self.tree.foot_body]
+        return equations._replace(normal=normal / max(np.linalg.norm(normal), 1e-300))
 
     @cached_property
     def _order(self) -> tuple[Any, Any]:

@@ -3,7 +3,8 @@
 
 What the inverse tells with other than three actuated joints: with fewer, the joint positions whose
 foot is nearest, if it is within 1 µm, otherwise UNREACHABLE; with more, those nearest to the
-initial posture.
+initial posture. A leg of two has the branches that the bends of its knee are; of one, the foot may
+pass a place more than once, and one of the passes is told.
 """
 
 from __future__ import annotations
@@ -25,12 +26,11 @@ from leg_kinematics.model.leg_tree import WHOLE_TURN
 from leg_kinematics.model.postures import (
     FEET_ARE_GIVEN,
     JOINTS_ARE_GIVEN,
+    SAME,
     Postures,
     known_postures,
 )
 from leg_kinematics.status import Status
-
-SAME = 1e-6  # rad or m, within which two solutions are one posture
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,9 @@ class NewtonLeg(ModelLeg):
     def forward(self, joint_positions: ArrayLike, assembly_mode: str = "") -> Posture:
         """Solve for the foot.
 
-        Where the loops close but the inverse of that foot is another posture, the posture is of
-        another branch: SINGULAR.
+        With two or three actuators, where the loops close but the inverse of that foot is another
+        posture, the posture is of another branch: SINGULAR. With one the foot may pass a place
+        twice, with more than three it reaches a place in many postures: all are of one branch.
         """
         return self.forward_with_twist(joint_positions, assembly_mode)[0]
 
@@ -83,11 +84,13 @@ class NewtonLeg(ModelLeg):
         q, foot, twist, _, status = newton.follow_postures(
             *self._branch(assembly_mode, signs), start, begin, end, JOINTS_ARE_GIVEN
         )
-        solved = status == Status.OK
-        back = self._followed(foot[solved], assembly_mode)[0]
-        same = np.abs(self._turned(back - q[solved])).max(axis=1, initial=0.0) <= SAME
         q[:, self._order[0]] = goal
-        status[solved] = np.where(same, self._limited(q[solved]), Status.SINGULAR)
+        solved = status == Status.OK
+        status[solved] = self._limited(q[solved])
+        if n in (2, 3):
+            back = self._followed(foot[solved], assembly_mode)[0]
+            same = np.abs(self._turned(back - q[solved])).max(axis=1, initial=0.0) <= SAME
+            status[np.flatnonzero(solved)[~same]] = Status.SINGULAR
         posture = self._posture(q, foot, status, given.shape[:-1])
         return posture._replace(joint_positions=given), twist.reshape(*given.shape[:-1], 6, n)
 
@@ -115,11 +118,20 @@ class NewtonLeg(ModelLeg):
     def _followed(self, feet: FloatArray, mode: str) -> tuple[FloatArray, FloatArray, StatusArray]:
         """Return all joint positions (m, N), twists and status of feet (m, 3)."""
         table = self._table(mode)
-        near = table.nearest_to_feet(feet)
-        q, _, twist, _, status = newton.follow_postures(
-            *self._branch(mode, table.signs),
-            *(table.joints[near], table.feet[near], feet, FEET_ARE_GIVEN),
-        )
+        branch = self._branch(mode, table.signs)
+
+        def followed(near: Any, feet: FloatArray) -> Any:
+            known = table.joints[near], table.feet[near]
+            q, _, twist, _, status = newton.follow_postures(*branch, *known, feet, FEET_ARE_GIVEN)
+            return q, twist, status
+
+        if len(self.joints) > 1:
+            return followed(table.nearest_to_feet(feet), feet)
+        passes = table.passes(feet)
+        q, twist, status = followed(passes[:, 0], feet)
+        for k in range(1, passes.shape[1]):
+            missed = status == Status.UNREACHABLE
+            q[missed], twist[missed], status[missed] = followed(passes[missed, k], feet[missed])
         return q, twist, status
 
     def _posture(

@@ -44,6 +44,8 @@ class Equations(NamedTuple):
         actuated: Numbers of the actuated joints (n,).
         passive: Numbers of the passive joints (m,).
         rest: Actuated joints of the initial posture (n,).
+        normal: Of a leg with two actuated joints, v_1 x v_2 of the foot in the initial posture, of
+            length 1 and in axes of the foot's body (3,); else it means nothing.
         signs: Signs that det C_p and det J keep (2,); 0 for one that may have either.
     """
 
@@ -54,6 +56,7 @@ class Equations(NamedTuple):
     actuated: FloatArray
     passive: FloatArray
     rest: FloatArray
+    normal: FloatArray
     signs: FloatArray
 
 

@@ -28,13 +28,17 @@ from leg_kinematics.status import Status
 
 UNREACHABLE, INVALID_INPUT = int(Status.UNREACHABLE), int(Status.INVALID_INPUT)
 
-CLOSED = 1e-11  # what may remain of an equation, relative to a leg of 1 m
+CLOSED = 1e-12  # what may remain of an equation, relative to a leg of 1 m
 REACHED = 1e-6  # m, how far a foot with fewer than three actuators may be from what it can reach
 SETTLED = 1e-12  # last step of such a leg
 JOINTS, FOOT = 0, 1  # what a posture is followed by
 SMALLEST_STEP = 1.0 / 256.0  # of a path
 LONGEST_TURN = 0.6  # rad or m, of a joint in one step of Newton's method
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 16
+# A step of Newton's method shrinks by this factor to the next one, or it left its basin. Close to a
+# singularity steps are only halved; they may be, when they are short.
+SHRINKS, SHRINKS_LATE, SHORT = 0.5, 0.7, 0.05  # [1, 1, rad or m]
+WEAKEST_PULL = 1.0 / 32.0  # towards the initial posture, in a step of a redundant leg
 
 
 @scalar
@@ -45,7 +49,8 @@ def solve_actuated(twist, error, away, step):
     foot so, the one nearest to `away`.
 
     Returns:
-        det J for three joints, and for others a number that vanishes where J loses rank.
+        det J for three joints, relative to its size, and for others a number >= 0 that vanishes
+        where J loses rank.
     """
     n = len(step)
     if n == 3:
@@ -100,11 +105,34 @@ def solve_actuated(twist, error, away, step):
 
 
 @scalar
-def step_to_foot(leg, q, goal, foot, room):
+def regularity(leg, det, room):
+    """Return what vanishes where the actuated joints lose hold of the foot.
+
+    It is det J for three joints, relative to its size. Of two it is the component of v_1 x v_2
+    along the normal that turns with the foot's body: so it has two signs for the two bends of a
+    knee, and of a leg that only turns about a point. For other numbers it has no sign.
+    """
+    if len(leg.actuated) != 2:
+        return det
+    turn, n = room.rotations[int(leg.foot[0])], leg.normal
+    total = 0.0
+    a, b, c = room.twist[0, 0], room.twist[1, 0], room.twist[2, 0]
+    d, e, f = room.twist[0, 1], room.twist[1, 1], room.twist[2, 1]
+    across = (b * f - c * e, c * d - a * f, a * e - b * d)
+    for r in range(3):
+        total += across[r] * (turn[r, 0] * n[0] + turn[r, 1] * n[1] + turn[r, 2] * n[2])
+    size = math.sqrt((a * a + b * b + c * c) * (d * d + e * e + f * f))
+    return total / size if size > 0.0 else 0.0
+
+
+@scalar
+def step_to_foot(leg, q, goal, foot, pull, room):
     """Fill the step of the actuated joints towards a foot.
 
+    That of more than three joints also goes the part `pull` of the way to the initial posture.
+
     Returns:
-        How far the foot is, and det J; see `solve_actuated`.
+        How far the foot is, and its `regularity`.
     """
     m, n = len(leg.passive), len(leg.actuated)
     far = 0.0
@@ -114,8 +142,9 @@ def step_to_foot(leg, q, goal, foot, room):
         for k in range(m):
             room.error[r] += room.foot[r, int(leg.passive[k])] * room.work[k, m + n]
     for k in range(n):
-        room.away[k] = leg.rest[k] - q[int(leg.actuated[k])]
-    return far, solve_actuated(room.twist, room.error, room.away, room.step)
+        room.away[k] = pull * (leg.rest[k] - q[int(leg.actuated[k])])
+    det = solve_actuated(room.twist, room.error, room.away, room.step)
+    return far, regularity(leg, det, room)
 
 
 @scalar
@@ -123,7 +152,7 @@ def step_to_joints(leg, q, goal, room):
     """Fill the step of the actuated joints towards given ones.
 
     Returns:
-        How far they are, and det J; see `solve_actuated`.
+        How far they are, and the `regularity` of the foot.
     """
     for k in range(len(leg.actuated)):
         room.away[k] = 0.0
@@ -133,7 +162,7 @@ def step_to_joints(leg, q, goal, room):
     for k in range(len(leg.actuated)):
         room.step[k] = goal[k] - q[int(leg.actuated[k])]
         far = max(far, abs(room.step[k]))
-    return far, det
+    return far, regularity(leg, det, room)
 
 
 @scalar
@@ -154,34 +183,46 @@ def take_step(leg, q, room):
 
 
 @scalar
+def contracts(before, move):
+    """Tell whether a step of Newton's method after another one stays in its basin."""
+    late = before < SHORT and move <= SHRINKS_LATE * before
+    return move <= SHRINKS * before or late or move < 1e-10
+
+
+@scalar
 def settle(leg, goal, aim, q, room):
     """Bring joint positions to a goal close by: of the foot (3,) or of the actuated joints (n,).
 
+    A foot with fewer than three actuators settles where it is nearest to the goal.
+
     Returns:
-        Whether Newton's method settled, the sign of det C_p, and det J; see `solve_actuated`.
+        Whether Newton's method settled, how far the goal is, the sign of det C_p, and `regularity`.
     """
     square = aim == JOINTS or len(leg.actuated) == 3  # equations determine the step
-    before = math.inf
+    before, pull = math.inf, 1.0
     for _ in range(MOST_ITERATIONS if len(leg.actuated) <= 3 else 10 * MOST_ITERATIONS):
         foot, open_by, sign = evaluate(leg, q, room)
         if sign == 0.0 or not math.isfinite(foot[0] + foot[1] + foot[2] + open_by):
-            return False, 0.0, 0.0
+            return False, math.inf, 0.0, 0.0
         if aim == FOOT:
-            far, det = step_to_foot(leg, q, goal, foot, room)
+            far, det = step_to_foot(leg, q, goal, foot, pull, room)
             if not abs(det) > DEAD_CENTRE:
-                return False, sign, 0.0
+                return False, far, sign, 0.0
         else:
             far, det = step_to_joints(leg, q, goal, room)
         if square and max(open_by, far) <= CLOSED:
-            return True, sign, det
+            return True, far, sign, det
         move = take_step(leg, q, room)
         if not square and move <= SETTLED and open_by <= CLOSED:
-            return far <= REACHED, sign, det
-        shrinks = move <= 0.5 * before or move < 1e-10 or len(leg.actuated) > 3
-        if not (move <= LONGEST_TURN and shrinks):
-            return False, sign, det
+            return True, far, sign, det
+        if len(leg.actuated) > 3:
+            pull = pull if move <= SHRINKS_LATE * before else max(0.5 * pull, WEAKEST_PULL)
+        elif not contracts(before, move):
+            return False, far, sign, det
+        if not move <= LONGEST_TURN:
+            return False, far, sign, det
         before = move
-    return False, 0.0, 0.0
+    return False, math.inf, 0.0, 0.0
 
 
 @scalar
@@ -208,9 +249,11 @@ def follow(leg, start, begin, end, aim, q, room):
         last[:] = q
         for k in range(len(end)):
             goal[k] = begin[k] + to * (end[k] - begin[k]) if to < 1.0 else end[k]
-        settled, sign, det = settle(leg, goal, aim, q, room)
+        settled, far, sign, det = settle(leg, goal, aim, q, room)
         if settled and sign * leg.signs[0] >= 0.0 and det * leg.signs[1] >= 0.0:
             done, part = to, 2.0 * part
+            if done == 1.0 and far > REACHED:
+                return False, 0.0, 0.0
             continue
         q[:] = last
         part *= 0.5
@@ -220,13 +263,13 @@ def follow(leg, start, begin, end, aim, q, room):
 
 
 @points_kernel(
-    "(n,8),(l,8),(4),(r),(a),(p),(a),(2),(points,n),(points,w),(points,w),(points)"
+    "(n,8),(l,8),(4),(r),(a),(p),(a),(3),(2),(points,n),(points,w),(points,w),(points)"
     "->(points,n),(points,3),(points,6,a),(points,2),(points)",
-    "f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 u1 f8 f8 f8 f8 u1",
+    "f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 u1 f8 f8 f8 f8 u1",
 )
 def follow_postures(
     chain: Any, loops: Any, foot: Any, rows: Any, actuated: Any, passive: Any, rest: Any,
-    signs: Any, start: Any, begin: Any, end: Any, aim: Any,
+    normal: Any, signs: Any, start: Any, begin: Any, end: Any, aim: Any,
     q: Any, place: Any, twist: Any, kept: Any, status: Any,
 ) -> None:  # fmt: skip
     """Follow postures `start` (n,) to where feet or actuated joints end (w,), as `aim` tells.
@@ -234,7 +277,7 @@ def follow_postures(
     What is found: all joint positions, the foot, J above J_omega, the signs of det C_p and det J,
     and a status, of which limits are not a part; NaN where there is no such posture.
     """
-    leg = Equations(chain, loops, foot, rows, actuated, passive, rest, signs)
+    leg = Equations(chain, loops, foot, rows, actuated, passive, rest, normal, signs)
     room = new_room(len(chain), len(loops), len(actuated))
     for i in range(len(start)):
         finite = 0.0

@@ -16,14 +16,15 @@ from leg_kinematics.model.equations import Equations, eliminate, evaluate, fill_
 
 
 @points_kernel(
-    "(n,8),(l,8),(4),(r),(a),(p),(a),(2),(points,n)->(points,6,a)", "f8 f8 f8 f8 f8 f8 f8 f8 f8 f8"
+    "(n,8),(l,8),(4),(r),(a),(p),(a),(3),(2),(points,n)->(points,6,a)",
+    "f8 f8 f8 f8 f8 f8 f8 f8 f8 f8 f8",
 )
 def twist_jacobian(
     chain: Any, loops: Any, foot: Any, rows: Any, actuated: Any, passive: Any, rest: Any,
-    signs: Any, q: Any, twist: Any,
+    normal: Any, signs: Any, q: Any, twist: Any,
 ) -> None:  # fmt: skip
     """J above J_omega of postures (n,)."""
-    leg = Equations(chain, loops, foot, rows, actuated, passive, rest, signs)
+    leg = Equations(chain, loops, foot, rows, actuated, passive, rest, normal, signs)
     room = new_room(len(chain), len(loops), len(actuated))
     for i in range(len(q)):
         evaluate(leg, q[i], room)
