@@ -36,6 +36,7 @@ from report import describe_machine, results_table, row_record  # noqa: E402
 ENTRIES = {
     "capacity": "load capacity with the true friction cone, and conic and linear solvers",
     "kinematics": "inverse kinematics, and Pinocchio",
+    "model_legs": "legs of robot models, serial and with a loop, and Pinocchio",
     "stances": "load factors and support regions of stances, and conic and linear solvers",
     "footholds": "footholds from position to verdict, and Pinocchio with Clarabel",
     "single": "one point a call",
