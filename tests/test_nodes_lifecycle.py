@@ -505,7 +505,14 @@ def test_the_demo_shows_everything_and_ends_well(tmp_path):
         timeout=START_TIMEOUT,
     )
     assert demo.returncode == 0, demo.stdout + demo.stderr
-    for words in ("left_front", "out of reach", "soft ground", "UnknownLegError", "Arrived"):
+    for words in (
+        "left_front",
+        "solo12",
+        "out of reach",
+        "soft ground",
+        "UnknownLegError",
+        "Arrived",
+    ):
         assert words in demo.stdout
     assert {path.name for path in tmp_path.iterdir()} == {
         *("map_load_capacity.png", "map_rated_friction.png"),

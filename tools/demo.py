@@ -32,6 +32,9 @@ from rich.console import Console  # noqa: E402
 from rich.markup import escape  # noqa: E402
 from rich.table import Table  # noqa: E402
 
+from leg_kinematics import load_robot  # noqa: E402
+from leg_statics import Contact, evaluate_footholds, load_grounds  # noqa: E402
+
 START_TIMEOUT = 600.0  # the first start on a machine compiles [s]
 WALK_TIMEOUT = 120.0  # s
 WALKER = Path(__file__).resolve().parent.parent / "examples" / "04_walk_over_terrain.py"
@@ -41,6 +44,8 @@ GROUNDS = ("ice", "wood", "cement")
 OFFSETS = np.array(  # candidate footholds, from the initial foot position [m]
     [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [-0.2, -0.05, 0.05], [0.0, 0.0, 0.15], [0.0, 0.0, -0.3]]
 )
+MODEL_LOAD = 8.0  # on one foot of the small robot [N]
+MODEL_OFFSETS = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0], [-0.08, 0.03, 0.04], [0.2, 0, -0.1]])
 HEIGHTS = np.array([0.50, 0.55, 0.60, 0.65, 0.70, 0.75])  # of the body over the ground [m]
 WRAPPED = ("message of the node",)  # columns of long texts
 MAP_HEIGHTS, MAP_RESOLUTION = (-0.7, -0.65, -0.6), 0.005  # m
@@ -75,6 +80,7 @@ def main() -> int:
                 wait_until_ready(client, nodes)
                 tour(client)
                 draw_maps(client, output)
+                show_model_robot()
                 with console.status("The planner walks ..."):
                     code = walker.wait(WALK_TIMEOUT)
             arrived = show_walk(output / "walk.json")
@@ -232,6 +238,20 @@ def show_refusals(client: LegClient, leg: LegDescription) -> None:
             request()
         except LegServiceError as error:
             table.add_row(what, type(error).__name__, escape(error.message))
+    console.print(table, "")
+
+
+def show_model_robot() -> None:
+    """Show what a leg of a public robot's URDF can carry, asked in this process."""
+    robot = load_robot("solo12")
+    leg = robot.leg("FL")
+    feet = leg.mechanism.initial_posture.foot_position + MODEL_OFFSETS
+    found = evaluate_footholds(leg, feet, Contact(load_grounds()["wood"].friction_low, MODEL_LOAD))
+    weight = "counts" if found.weight_counted else "does not count"
+    title = f"{robot.name} from its URDF: can {leg.name} bear {MODEL_LOAD:g} N? Its weight {weight}"
+    table = new_table(title, "foothold [m]", "capacity [N]", "verdict")
+    for foot, capacity, verdict in zip(feet, found.load_capacity, found.verdict, strict=True):
+        table.add_row(vector(foot), number(capacity, 1), VERDICTS[int(verdict)])
     console.print(table, "")
 
 

@@ -14,6 +14,7 @@ A file has this form (lengths and angles in the units it states, efforts in N.m 
         joint_limits: {crank_1: [-21, 21], ...}
         passive_joint_limits: {u1_along: [-45, 45], ...}  # of excursions from the initial posture
         effort_limits: {crank_1: 150, crank_2: [-150, 120], ...}
+        masses: {H-R3: 2.5, R1-R2: {mass: 1.2, at: 0.4}, S: 0.3}  # optional [kg], see below
     legs:
       left_front:
         type: initial
@@ -29,7 +30,11 @@ for a drive that counts the other way round; `zero` (default 0) is what the driv
 position zero, in the file's unit of the joint. Efforts are divided by the scale. Limits, services
 and maps speak of the joints themselves.
 
-The mass counts for stances; of a robot model that tells its masses it is optional.
+The `mass` of the body counts for stances; of a robot model that tells its masses it is optional.
+
+Masses are on bars, named by the two points of the linkage that are their ends, at `at` of the way
+from the first to the second (default 0.5, the middle), or at single points. With them the weight of
+the leg counts in every load problem.
 
 Legs of a robot model need no leg type; see `leg_kinematics.model_description`:
 
@@ -45,6 +50,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +68,17 @@ from leg_kinematics.documents import (
     named_schema,
     shared_files,
 )
-from leg_kinematics.errors import DescriptionError, GeometryError, NotSupportedError
+from leg_kinematics.errors import (
+    DescriptionError,
+    GeometryError,
+    NotSupportedError,
+    UnknownNameError,
+)
 from leg_kinematics.files import existing_path, exists, user_path
 from leg_kinematics.geometry import geometry_parameters
 from leg_kinematics.mechanism import Excursion, Joint, Mechanism
 from leg_kinematics.mechanisms import MECHANISMS
+from leg_kinematics.mechanisms.weighed import BarMass
 from leg_kinematics.mirrored import Mirrored
 from leg_kinematics.model_description import (
     EFFORT,
@@ -77,6 +89,20 @@ from leg_kinematics.model_description import (
 )
 from leg_kinematics.robot import Body, Drives, Leg, Mount, Robot
 
+MASS = {"type": "number", "minimum": 0}
+BAR_MASSES = {
+    "type": "object",
+    "maxProperties": 1000,
+    "additionalProperties": {
+        "description": "a number >= 0 [kg] or {mass: number, at: 0 .. 1}",
+        "oneOf": [
+            MASS,
+            mapping_schema(
+                {"mass": MASS, "at": {"type": "number", "minimum": 0, "maximum": 1}}, ["mass"]
+            ),
+        ],
+    },
+}
 MOST_LEGS = 64  # and leg types
 
 UNITS = {
@@ -168,6 +194,7 @@ def _leg_type_schema(mechanism: Mechanism) -> dict[str, Any]:
             "joint_limits": mapping_schema(dict.fromkeys(joints, PAIR), joints),
             "passive_joint_limits": mapping_schema(dict.fromkeys(excursions, PAIR), excursions),
             "effort_limits": mapping_schema(dict.fromkeys(joints, EFFORT), joints),
+            "masses": BAR_MASSES,
         },
         ["mechanism", "geometry", "joint_limits", "passive_joint_limits", "effort_limits"],
     )
@@ -281,15 +308,29 @@ def _mechanism(document: Document, name: str, units: Mapping[str, float]) -> Any
             pairs.append((lower * scale, upper * scale))
         return tuple(pairs)
 
+    masses = leg_type.get("masses", {})
     try:
-        return mechanism(
+        found = mechanism(
             **geometry,
             joint_ranges=ranges("joint_limits", example.joints),
             passive_joint_ranges=ranges("passive_joint_limits", example.excursions),
+            **({"bar_masses": tuple(starmap(_bar_mass, masses.items()))} if masses else {}),
         )
     except GeometryError as error:
         message = f"cannot be assembled: {error}"
         raise document.error(message, "leg_types", name, "geometry") from None
+    if masses:
+        try:
+            found.loads()
+        except (GeometryError, UnknownNameError) as error:
+            raise document.error(str(error), "leg_types", name, "masses") from None
+    return found
+
+
+def _bar_mass(bar: str, value: Any) -> BarMass:
+    """Return the mass that a description gives a bar or a point."""
+    entry = value if isinstance(value, Mapping) else {"mass": value}
+    return BarMass(tuple(bar.split("-")), float(entry["mass"]), float(entry.get("at", 0.5)))
 
 
 def _effort_limits(document: Document, leg_type: str, joints: Sequence[Joint]) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from leg_kinematics import Leg, Mirrored, Status, load_robot
+from leg_kinematics.mechanisms.weighed import BarMass
 from leg_statics import Contact, common_step, evaluate_footholds, load_capacity, longest_step
 from leg_statics.joint_layout import joint_layout
 from leg_statics.leg_state import Surroundings, leg_states
@@ -107,3 +108,16 @@ def test_legs_of_unknown_mass_tell_that_no_weight_is_counted():
 def test_gravity_that_does_not_fit_is_told(gravity):
     with pytest.raises(ValueError, match="gravity"):
         evaluate_footholds(LEG, FEET, Contact(0.5, gravity=gravity))
+
+
+def test_masses_on_bars_of_a_linkage_count():
+    bare = load_robot("hexapod").leg("left_front").geometry
+    mechanism = replace(bare, bar_masses=(BarMass(("H", "R3"), 3.0), BarMass(("R5", "C"), 2.0)))
+    leg = Leg.of(mechanism, (-150.0, 150.0))
+    foot = mechanism.initial_posture.foot_position
+    found, without = (evaluate_footholds(one, foot, Contact(0.5)) for one in (leg, Leg.of(bare)))
+    assert found.weight_counted
+    assert not without.weight_counted
+    wanted = weight_efforts(mechanism, found.posture, level_gravity(leg))
+    np.testing.assert_allclose(found.joint_efforts, wanted, rtol=1e-12, atol=1e-12)
+    assert np.abs(wanted).max() > 1.0

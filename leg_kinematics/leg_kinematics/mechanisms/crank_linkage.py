@@ -25,10 +25,10 @@ from numpy.typing import ArrayLike, NDArray
 from leg_kinematics.arrays import FloatArray, as_array, as_matching, wrapped_angles
 from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.geometry import Dimensioned
 from leg_kinematics.kernels.scalars import LIMIT_TOLERANCE
 from leg_kinematics.mechanism import Joint, Linkage, Posture
 from leg_kinematics.mechanisms.crank_kernels import Kernels, near_brackets
+from leg_kinematics.mechanisms.weighed import Weighed
 from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
@@ -87,7 +87,7 @@ def _direction(vectors: FloatArray) -> FloatArray:
     return np.arctan2(vectors[..., 2], -vectors[..., 0])
 
 
-class CrankLinkage(Dimensioned):
+class CrankLinkage(Weighed):
     """Base of the mechanisms with one crank; a subclass is a frozen dataclass of its geometry.
 
     A range of a joint that spans a whole turn or more does not limit it: the joint turns endlessly,
@@ -477,6 +477,11 @@ class CrankLinkage(Dimensioned):
     @cached_property
     def _trees(self) -> dict[int, LegTree]:
         return {}
+
+    def _body_modes(self, posture: Posture) -> Any:
+        """Return indices of the modes (...), by the signs of the closure."""
+        same = np.sign(posture.closure)[..., None, :] == np.sign(self.sides)
+        return np.argmax(same.all(axis=-1), axis=-1)
 
     def _closed_posture(self, assembly_mode: str) -> Posture:
         """Return the posture at zero, or the middle of where the bars close."""

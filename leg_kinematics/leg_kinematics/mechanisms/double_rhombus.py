@@ -45,11 +45,12 @@ from leg_kinematics.arrays import FloatArray, as_array, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.geometry import Dimensioned, parameter
+from leg_kinematics.geometry import parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import included_angle, swing_plane, within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
+from leg_kinematics.mechanisms.weighed import BarMass, Weighed
 from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
@@ -422,7 +423,7 @@ def _range_deg(lower: float, upper: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class DoubleRhombus(Dimensioned):
+class DoubleRhombus(Weighed):
     """The leg with double rhombus and three cylinders; defaults are the paper's dimensions.
 
     Joint positions are the lengths of the cylinders, pin to pin. The foot position is that of I in
@@ -487,6 +488,7 @@ class DoubleRhombus(Dimensioned):
         *(_range_deg(-10.0, 10.0), _range_deg(-55.0, 55.0)),
         *(_range_deg(-30.0, 30.0), _range_deg(-15.0, 15.0), _range_deg(-25.0, 25.0)),
     )
+    bar_masses: tuple[BarMass, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the dimensions; the initial posture must be off every dead centre."""

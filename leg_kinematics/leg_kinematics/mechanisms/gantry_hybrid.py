@@ -45,12 +45,13 @@ from leg_kinematics.arrays import FloatArray, as_array, as_matching
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.geometry import Dimensioned, offset, parameter
+from leg_kinematics.geometry import offset, parameter
 from leg_kinematics.kernels.kernel import kernel, scalar
 from leg_kinematics.kernels.points_kernel import points_kernel
 from leg_kinematics.kernels.scalars import within, wrapped
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
 from leg_kinematics.mechanisms.universal_joints import AuxiliaryChain, shaft_state
+from leg_kinematics.mechanisms.weighed import BarMass, Weighed
 from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 from leg_kinematics.status import Status
 
@@ -466,7 +467,7 @@ def _range_deg(lower: float, upper: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class GantryHybrid(Dimensioned):
+class GantryHybrid(Weighed):
     """The gantry manipulator; defaults are the dimensions of the paper's example.
 
     Joint positions are the displacements s1, s2, s3, s4 of the slides A, E, B, C. The "foot
@@ -520,6 +521,7 @@ class GantryHybrid(Dimensioned):
         *(_range_deg(-10.0, 40.0), _range_deg(-10.0, 40.0)),
         (-0.150, 0.050),
     )
+    bar_masses: tuple[BarMass, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the posture with all slides at zero."""

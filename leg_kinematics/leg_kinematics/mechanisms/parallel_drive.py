@@ -36,7 +36,7 @@ from leg_kinematics.arrays import FloatArray, as_array, has_code, wrapped_angles
 from leg_kinematics.assembly_modes import flipped_modes, mode_signs
 from leg_kinematics.bodies import LegTree
 from leg_kinematics.errors import GeometryError
-from leg_kinematics.geometry import Dimensioned, offset, parameter
+from leg_kinematics.geometry import offset, parameter
 from leg_kinematics.kernels.scalars import direction
 from leg_kinematics.kernels.settled import UNCERTAIN, settled
 from leg_kinematics.mechanism import Excursion, Joint, Linkage, Posture
@@ -54,6 +54,7 @@ from leg_kinematics.mechanisms.parallel_drive_equations import (
     symmetric_elevation,
 )
 from leg_kinematics.mechanisms.walking_axes import leg_vectors
+from leg_kinematics.mechanisms.weighed import BarMass, Weighed
 from leg_kinematics.placed_joints import Meeting, PlacedJoint, tree_of
 
 ACROSS, CONES = [1, 3, 5], [6, 7, 8]  # passive joints told by a sine and by a chord
@@ -77,7 +78,7 @@ def closed(loop: Callable[..., Any], *arguments: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class ParallelDrive(Dimensioned):
+class ParallelDrive(Weighed):
     """The parallel-driving leg; defaults are the paper's initial dimensions.
 
     The foot position is that of C in the leg frame, whose origin is the hip H.
@@ -132,6 +133,7 @@ class ParallelDrive(Dimensioned):
         *((-PASSIVE_RANGE, PASSIVE_RANGE),) * 6,
         *((0.0, PASSIVE_RANGE),) * 3,
     )
+    bar_masses: tuple[BarMass, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the dimensions by assembling the initial posture."""

@@ -40,6 +40,7 @@ from leg_kinematics.mechanisms.dyads import (
     transmission,
     triangle_coefficients,
 )
+from leg_kinematics.mechanisms.weighed import BarMass
 from leg_kinematics.placed_joints import Meeting
 
 
@@ -210,3 +211,4 @@ class SixBar(CrankLinkage):
 
     joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,)
     passive_joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,) * 6
+    bar_masses: tuple[BarMass, ...] = ()

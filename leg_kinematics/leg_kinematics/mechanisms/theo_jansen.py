@@ -39,6 +39,7 @@ from leg_kinematics.mechanisms.dyads import (
     transmission,
     triangle_coefficients,
 )
+from leg_kinematics.mechanisms.weighed import BarMass
 from leg_kinematics.placed_joints import Meeting
 
 
@@ -226,3 +227,4 @@ class TheoJansen(CrankLinkage):
 
     joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,)
     passive_joint_ranges: tuple[tuple[float, float], ...] = (ANY_ANGLE,) * 9
+    bar_masses: tuple[BarMass, ...] = ()
