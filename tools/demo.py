@@ -247,7 +247,7 @@ def show_model_robot() -> None:
     leg = robot.leg("FL")
     feet = leg.mechanism.initial_posture.foot_position + MODEL_OFFSETS
     found = evaluate_footholds(
-        leg, feet, Contact(load_grounds().find("wood").friction_low, MODEL_LOAD)
+        leg, feet, Contact(load_grounds().find("wood").friction_low, load=MODEL_LOAD)
     )
     weight = "counts" if found.weight_counted else "does not count"
     title = f"{robot.name} from its URDF: can {leg.name} bear {MODEL_LOAD:g} N? Its weight {weight}"
