@@ -3,7 +3,7 @@
 
 It asks in-process, without nodes, what the node `terrain` publishes:
 
-    ./leg python examples/06_footholds_on_terrain.py --output /tmp/terrain
+    ./leg python examples/06_footholds_on_terrain.py --output pictures
 """
 
 import argparse

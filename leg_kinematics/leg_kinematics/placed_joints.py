@@ -14,6 +14,8 @@ from leg_kinematics.arrays import FloatArray
 from leg_kinematics.bodies import BASE, Coincidence, LegJoint, LegTree, Vector, as_vector
 from leg_kinematics.mechanism import Joint, Mechanism, Posture
 
+PIN_LENGTH = 0.1  # m, between the two points that a pin keeps together
+
 
 class PlacedJoint(NamedTuple):
     """A joint of a mechanism in a posture.
@@ -104,9 +106,6 @@ def tree_of(
             places.append(places[0] + PIN_LENGTH * np.asarray(pin))
         coincidences += [Coincidence(*on_body(first, p), *on_body(second, p)) for p in places]
     return LegTree(tuple(found), tuple(coincidences), *on_body(foot[1], linkage.point(foot[0])))
-
-
-PIN_LENGTH = 0.1  # m, between the two points that a pin keeps together
 
 
 def rotation_about(axis: FloatArray, angle: float) -> FloatArray:

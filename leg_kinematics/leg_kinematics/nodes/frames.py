@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -194,17 +195,41 @@ def read_mount(field: str, place: Any, turn: Any) -> Mount:
     Raises:
         RequestError: If it is not finite, or the quaternion is not of length 1.
     """
-    position = np.array([place.x, place.y, place.z])
-    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-    if not np.isfinite(position).all():
-        raise RequestError(f"{field}.position: got {position.tolist()}; allowed: finite values")
-    norm = float(np.linalg.norm(quaternion))
-    if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+    positions, rotations = _placements([field], [place], [turn])
+    return Mount(positions[0], rotations[0])
+
+
+def read_poses(field: str, poses: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+    """Return the positions (S, 3) [m] and rotations (S, 3, 3) of poses of a request, at least one.
+
+    Raises:
+        RequestError: If one is not finite, or its quaternion is not of length 1.
+    """
+    names = [f"{field}[{k}]" for k in range(len(poses))]
+    return _placements(names, [p.position for p in poses], [p.orientation for p in poses])
+
+
+def _placements(
+    fields: Sequence[str], places: Sequence[Any], turns: Sequence[Any]
+) -> tuple[FloatArray, FloatArray]:
+    """Return points (S, 3) and the rotations (S, 3, 3) of quaternions x, y, z, w."""
+    positions = np.array([(p.x, p.y, p.z) for p in places])
+    quaternions = np.array([(q.x, q.y, q.z, q.w) for q in turns])
+    far = ~np.isfinite(positions).all(axis=-1)
+    if far.any():
+        k = int(np.argmax(far))
         raise RequestError(
-            f"{field}.orientation: got {quaternion.tolist()} (x, y, z, w) of length {norm:g}; "
-            "allowed: a quaternion of length 1"
+            f"{fields[k]}.position: got {positions[k].tolist()}; allowed: finite values"
         )
-    return Mount(position, Rotation.from_quat(quaternion).as_matrix())
+    norms = np.linalg.norm(quaternions, axis=-1)
+    wrong = ~(np.abs(norms - 1.0) <= UNIT_TOLERANCE)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise RequestError(
+            f"{fields[k]}.orientation: got {quaternions[k].tolist()} (x, y, z, w) of length "
+            f"{norms[k]:g}; allowed: a quaternion of length 1"
+        )
+    return positions, Rotation.from_quat(quaternions).as_matrix()
 
 
 def no_transforms(robot: Robot, frame_id: str, why: str) -> RequestError:

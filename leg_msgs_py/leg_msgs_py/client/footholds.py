@@ -19,6 +19,9 @@ from leg_msgs_py.frames import Frame, put_frame
 from leg_msgs_py.grounds import Ground, ground_message
 from numpy.typing import ArrayLike, NDArray
 
+AGAINST_GRAVITY = QueryFootholds.Request.AGAINST_GRAVITY
+ALONG_NORMAL = QueryFootholds.Request.ALONG_NORMAL
+
 
 class Footholds(NamedTuple):
     """Answer of `query_footholds`.
@@ -221,10 +224,6 @@ def query_footholds_of_legs(
         }
 
     return Request(request, decode, everything)
-
-
-AGAINST_GRAVITY = QueryFootholds.Request.AGAINST_GRAVITY
-ALONG_NORMAL = QueryFootholds.Request.ALONG_NORMAL
 
 
 def _of_leg(response: Any, k: int, part: slice, batch: tuple[int, ...]) -> Footholds:

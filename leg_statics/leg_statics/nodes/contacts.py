@@ -59,6 +59,20 @@ def standing_leg(robot: Robot, name: str) -> Leg:
     return leg
 
 
+def standing_legs(robot: Robot, names: Sequence[str]) -> list[Leg]:
+    """Return legs by their names.
+
+    Raises:
+        UnknownNameError: If there is no leg of a name.
+        NotSupportedError: If one does not end in a foot that the ground could push.
+        RequestError: If a leg is named twice.
+    """
+    for name in names:
+        if names.count(name) > 1:
+            raise RequestError(f"legs: {name!r} is given twice; allowed: once each")
+    return [standing_leg(robot, name) for name in names]
+
+
 class GroundRows(NamedTuple):
     """Grounds of a request, in its frame: what is one for all is a number or tuple, else an array.
 

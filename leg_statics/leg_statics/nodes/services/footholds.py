@@ -25,7 +25,7 @@ from leg_statics.footholds import (
     evaluate_around,
     evaluate_footholds,
 )
-from leg_statics.nodes.contacts import magnitude, read_contacts, standing_leg
+from leg_statics.nodes.contacts import magnitude, read_contacts, standing_legs
 from leg_statics.nodes.hosts import GroundsHost
 
 
@@ -40,7 +40,7 @@ def _summary(response: Any) -> Summary:
 @service(QueryFootholds, summary=_summary, best_unit="N")
 def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
     """Fill what legs can carry at candidate footholds."""
-    legs = _legs(host, request)
+    legs = standing_legs(host.robot, list(request.legs) or [""])
     frames = _frames(host, legs, request)
     positions = read_rows("positions", request.positions, XYZ)
     parts = _parts(request, legs, len(positions))
@@ -76,20 +76,6 @@ def query_footholds(host: GroundsHost, request: Any, response: Any) -> None:
         response.joint_efforts = to_field(efforts)
         forces = zip(frames, found, strict=True)
         response.force = to_field(np.concatenate([f.vectors_from_leg(e.force) for f, e in forces]))
-
-
-def _legs(host: GroundsHost, request: Any) -> list[Leg]:
-    """Return the legs that a request is about.
-
-    Raises:
-        UnknownNameError: If there is no leg of a name, or none is named and there are several.
-        RequestError: If a leg is named twice.
-    """
-    names = list(request.legs)
-    for name in names:
-        if names.count(name) > 1:
-            raise RequestError(f"legs: {name!r} is given twice; allowed: once each")
-    return [standing_leg(host.robot, name) for name in names or [""]]
 
 
 def _frames(host: GroundsHost, legs: Sequence[Leg], request: Any) -> list[LegFrame]:

@@ -13,11 +13,12 @@ import numpy as np
 from leg_msgs.srv import QueryStance
 from leg_msgs_py.arrays import from_field, to_field
 
-from leg_kinematics.arrays import FloatArray
+from leg_kinematics.arrays import FloatArray, as_array
+from leg_kinematics.nodes.frames import read_poses
 from leg_kinematics.nodes.requests import RequestError, check_count
 from leg_kinematics.nodes.service import Summary, service
 from leg_kinematics.robot import Leg, Robot
-from leg_statics.nodes.contacts import standing_leg
+from leg_statics.nodes.contacts import finite, standing_legs
 from leg_statics.nodes.hosts import GroundsHost
 from leg_statics.stance.region import margin_along, support_region
 from leg_statics.stance.stances import (
@@ -32,7 +33,6 @@ from leg_statics.stance.standing import BodyPose, robot_load, robot_stance
 from leg_statics.weight import LEVEL_GRAVITY
 
 FEWEST_DIRECTIONS, MOST_DIRECTIONS = 3, 360
-UNIT = 1e-3  # by how much the length of a quaternion may differ from 1
 
 
 class Asked(NamedTuple):
@@ -104,10 +104,11 @@ def _read(host: GroundsHost, request: Any, directions: int) -> Asked:
         NotSupportedError: If a leg has no point foot.
         RequestError: If something does not fit or is out of range.
     """
-    legs = _legs(host.robot, request)
+    legs = standing_legs(host.robot, list(request.legs) or list(host.robot.legs))
     count = len(legs)
+    pose = _poses(host.robot, request)
     rows = {
-        "base_poses": _poses(host.robot, request),
+        "base_poses": as_array("base_poses", pose.position, 3),
         "feet": _rows("feet", request.feet, 3 * count).reshape(-1, count, 3),
         "friction_coefficients": _friction(host, request, count),
         "normals": _normals(request, count),
@@ -121,7 +122,6 @@ def _read(host: GroundsHost, request: Any, directions: int) -> Asked:
         raise RequestError(f"stances: got {told}; allowed: 1 row, or as many as the others have")
     stances = max(several.values(), default=1)
     check_count("stances, legs and directions", stances * count * directions, host.max_points)
-    pose = BodyPose(rows["base_poses"][:, :3, 3], rows["base_poses"][:, :3, :3])
     load = _load(host.robot, request, pose, rows["center_of_mass"])
     feet = np.broadcast_to(rows["feet"], (stances, count, 3))
     normal = rows["normals"] if len(rows["normals"]) else -np.asarray(load.gravity)
@@ -136,17 +136,8 @@ def _read(host: GroundsHost, request: Any, directions: int) -> Asked:
     return Asked(legs, pose, stance, load)
 
 
-def _legs(robot: Robot, request: Any) -> list[Leg]:
-    """Return the legs on the ground."""
-    names = list(request.legs) or list(robot.legs)
-    for name in names:
-        if names.count(name) > 1:
-            raise RequestError(f"legs: {name!r} is given twice; allowed: once each")
-    return [standing_leg(robot, name) for name in names]
-
-
-def _poses(robot: Robot, request: Any) -> FloatArray:
-    """Return the poses of the base frame as matrices (1 or S, 4, 4)."""
+def _poses(robot: Robot, request: Any) -> BodyPose:
+    """Return the poses of the base frame (1 or S)."""
     frame, poses = request.header.frame_id, request.base_poses
     if not poses:
         if frame not in ("", robot.base_frame):
@@ -154,36 +145,13 @@ def _poses(robot: Robot, request: Any) -> FloatArray:
                 f"header.frame_id: got {frame!r}; allowed without base_poses: '' or "
                 f"{robot.base_frame!r} (the robot's base)"
             )
-        return np.eye(4)[None]
+        return BodyPose(np.zeros((1, 3)), np.eye(3)[None])
     if frame in ("", robot.base_frame):
         raise RequestError(
             f"header.frame_id: got {frame!r} with base_poses; allowed: the name of the frame in "
             "which they are, such as 'map'"
         )
-    at = np.array([(p.position.x, p.position.y, p.position.z) for p in poses])
-    turned = [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
-    quaternions = np.array(turned)
-    length = np.sqrt((quaternions**2).sum(axis=-1))
-    wrong = np.flatnonzero(~(np.abs(length - 1.0) < UNIT))
-    if len(wrong):
-        raise RequestError(
-            f"base_poses[{wrong[0]}].orientation: got {turned[wrong[0]]}; allowed: a quaternion "
-            "of length 1"
-        )
-    matrices = np.zeros((len(poses), 4, 4))
-    matrices[:, :3, :3] = _rotations(quaternions / length[:, None])
-    matrices[:, :3, 3] = at
-    return matrices
-
-
-def _rotations(quaternions: FloatArray) -> FloatArray:
-    """Return the matrices (S, 3, 3) of unit quaternions x, y, z, w (S, 4)."""
-    vector, scalar = quaternions[:, :3], quaternions[:, 3, None, None]
-    x, y, z = vector.T
-    zero = np.zeros(len(x))
-    across = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
-    rotations: FloatArray = np.eye(3) + 2.0 * (scalar * across + across @ across)
-    return rotations
+    return BodyPose(*read_poses("base_poses", poses))
 
 
 def _friction(host: GroundsHost, request: Any, legs: int) -> FloatArray:
@@ -221,7 +189,7 @@ def _normals(request: Any, legs: int) -> FloatArray:
 
 def _load(robot: Robot, request: Any, pose: BodyPose, center: FloatArray) -> Load:
     """Return the load."""
-    mass, gravity = float(request.mass), _finite("gravity", request.gravity)
+    mass, gravity = float(request.mass), finite("gravity", request.gravity)
     if not 0.0 <= mass < math.inf:
         raise RequestError(f"mass: got {mass}; allowed: finite and >= 0 kg, 0 = the description's")
     if not gravity.any():
@@ -229,10 +197,10 @@ def _load(robot: Robot, request: Any, pose: BodyPose, center: FloatArray) -> Loa
     load = Load(mass, pose.from_base(np.zeros(3)), gravity) if mass else robot_load(robot, pose)
     if len(center):
         load = load._replace(center_of_mass=pose.from_base(center))
-    wrench = _finite("wrench", request.wrench)
+    wrench = finite("wrench", request.wrench)
     return load._replace(
         gravity=gravity,
-        acceleration=_finite("acceleration", request.acceleration),
+        acceleration=finite("acceleration", request.acceleration),
         force=wrench[:3],
         moment=wrench[3:],
     )
@@ -260,9 +228,3 @@ def _rows(field: str, values: Any, columns: int) -> FloatArray:
 def _vectors(field: str, values: Any) -> FloatArray:
     """Return vectors (m, 3)."""
     return _rows(field, values, 3)
-
-
-def _finite(field: str, values: Any) -> FloatArray:
-    if not all(map(math.isfinite, values)):
-        raise RequestError(f"{field}: got {list(map(float, values))}; allowed: finite values")
-    return np.array(values, dtype=np.float64)
