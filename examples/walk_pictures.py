@@ -92,9 +92,10 @@ def plot_steps(half_steps: Sequence[HalfStep], reserve: float) -> Figure:
     factor.annotate(
         f"reserve {reserve:g}",
         (number[-1], reserve),
-        xytext=(0, 3),
+        xytext=(0, -3),
         textcoords="offset points",
         ha="right",
+        va="top",
         fontsize=SMALL,
     )
     factor.set_ylabel("load factor of the\nstance, at worst", fontsize=SMALL)
@@ -110,7 +111,7 @@ def plot_steps(half_steps: Sequence[HalfStep], reserve: float) -> Figure:
     friction.set_ylabel("friction: used (markers)\nand offered (bars)", fontsize=SMALL)
     friction.set_xlabel("half step", fontsize=SMALL)
     for ax in (steps, factor, margin, friction):
-        ax.set_ylim(bottom=0.0)
+        ax.set_ylim(0.0, 1.1 * ax.dataLim.ymax)
         ax.tick_params(labelsize=SMALL)
         ax.set_xticks(number)
         ax.grid(axis="y", color="0.9", linewidth=0.5)
